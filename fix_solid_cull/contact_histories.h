@@ -1,0 +1,51 @@
+// The engine's granule-granule contact histories, as partner lists of the owned granules.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "pointers.h"
+
+namespace LAMMPS_NS {
+class FixContactHistory;
+}
+
+namespace solidcull {
+
+/// Valid between FixContactHistory::pre_exchange (which fills the partner lists) and the next neighbour build. Local.
+class ContactHistories : protected LAMMPS_NS::Pointers {
+ public:
+  explicit ContactHistories(LAMMPS_NS::LAMMPS* lmp) : Pointers(lmp) {}
+
+  /// Finds the engine's fix again (it is made and deleted with the pair style).
+  void connect();
+  /// One entry per history number: does it change sign with the side it is seen from? Empty without histories.
+  std::vector<bool> flips() const;
+  /// Outside of a time step: have the engine fill the partner lists from its neighbour lists if those are newer.
+  void bring_up_to_date();
+
+  template <class Visit>
+  void for_each_partner(int granule, Visit visit) const {
+    const int n = partners(granule);
+    for (int k = 0; k < n; ++k) visit(partner(granule, k), history(granule, k));
+  }
+  void clear(int granule) { write(granule, {}); }
+
+  struct Contact {
+    std::int64_t partner;
+    std::vector<double> history;
+  };
+  /// Adds contacts to an owned granule's list; a partner that is there already keeps what it has.
+  void give(int granule, const std::vector<Contact>& contacts);
+
+ private:
+  int partners(int granule) const;
+  int partner(int granule, int k) const;
+  const double* history(int granule, int k) const;
+  void write(int granule, const std::vector<Contact>& contacts);
+
+  LAMMPS_NS::FixContactHistory* fix_ = nullptr;
+};
+
+}  // namespace solidcull

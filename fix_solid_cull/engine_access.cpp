@@ -1,0 +1,73 @@
+// A pointer to a private member may be named in an explicit template instantiation ([temp.explicit]): legal C++, and checked by
+// the compiler against the engine's own headers, so a LIGGGHTS that names these members otherwise does not compile.
+#include "engine_access.h"
+
+#include "fix.h"
+#include "fix_contact_history.h"
+#include "fix_insert.h"
+#include "fix_insert_pack.h"
+#include "modify.h"
+#include "neighbor.h"
+#include "thermo.h"
+
+namespace solidcull::engine {
+
+template <class Tag, typename Tag::type Member>
+struct Expose {
+  friend typename Tag::type member(Tag) { return Member; }
+};
+
+#define SOLIDCULL_EXPOSE(NAME, CLASS, TYPE, MEMBER) \
+  struct NAME {                                     \
+    using type = TYPE LAMMPS_NS::CLASS::*;          \
+    friend type member(NAME);                       \
+  };                                                \
+  template struct Expose<NAME, &LAMMPS_NS::CLASS::MEMBER>;
+
+using FixStyles = std::map<std::string, FixCreator>;
+SOLIDCULL_EXPOSE(ModifyFixMap, Modify, FixStyles*, fix_map)
+SOLIDCULL_EXPOSE(HistoryNewton, FixContactHistory, int*, newtonflag_)
+SOLIDCULL_EXPOSE(ExcludeCount, Neighbor, int, nex_group)
+SOLIDCULL_EXPOSE(ExcludeFirst, Neighbor, int*, ex1_group)
+SOLIDCULL_EXPOSE(ExcludeSecond, Neighbor, int*, ex2_group)
+SOLIDCULL_EXPOSE(InsertCompress, FixInsert, bool, compress_flag)
+SOLIDCULL_EXPOSE(PackRegion, FixInsertPack, LAMMPS_NS::Region*, ins_region)
+SOLIDCULL_EXPOSE(ThermoAtoms, Thermo, LAMMPS_NS::bigint, last_natoms)
+#undef SOLIDCULL_EXPOSE
+
+std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify) { return *(modify.*member(ModifyFixMap())); }
+
+const int* history_newton_flags(const LAMMPS_NS::FixContactHistory& fix) { return fix.*member(HistoryNewton()); }
+
+bool excludes_group(const LAMMPS_NS::Neighbor& neighbor, int group) {
+  const int* first = neighbor.*member(ExcludeFirst());
+  const int* second = neighbor.*member(ExcludeSecond());
+  for (int k = 0; k < neighbor.*member(ExcludeCount()); ++k)
+    if (first[k] == group && second[k] == group) return true;
+  return false;
+}
+
+void include_group_again(LAMMPS_NS::Neighbor& neighbor, int group) {
+  int& count = neighbor.*member(ExcludeCount());
+  int* first = neighbor.*member(ExcludeFirst());
+  int* second = neighbor.*member(ExcludeSecond());
+  int kept = 0;
+  for (int k = 0; k < count; ++k) {
+    if (first[k] == group && second[k] == group) continue;
+    first[kept] = first[k];
+    second[kept++] = second[k];
+  }
+  count = kept;
+}
+
+bool compresses_tags(const LAMMPS_NS::FixInsert& fix) { return fix.*member(InsertCompress()); }
+
+
+void expect_atoms(LAMMPS_NS::Thermo& thermo, long change) { thermo.*member(ThermoAtoms()) += change; }
+
+const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::Fix* fix) {
+  const auto* pack = dynamic_cast<const LAMMPS_NS::FixInsertPack*>(fix);
+  return pack ? pack->*member(PackRegion()) : nullptr;
+}
+
+}  // namespace solidcull::engine

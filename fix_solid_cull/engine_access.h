@@ -1,0 +1,41 @@
+// Members of LIGGGHTS 3.8 that have no accessor, reached in this one place.
+#pragma once
+
+#include <map>
+#include <string>
+
+namespace LAMMPS_NS {
+class Fix;
+class FixContactHistory;
+class FixInsert;
+class LAMMPS;
+class Modify;
+class Neighbor;
+class Region;
+class Thermo;
+}  // namespace LAMMPS_NS
+
+namespace solidcull::engine {
+
+using FixCreator = LAMMPS_NS::Fix* (*)(LAMMPS_NS::LAMMPS*, int, char**);
+
+/// The engine's table of fix styles.
+std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify);
+
+/// Per history number: 1 if it changes sign with the side it is seen from.
+const int* history_newton_flags(const LAMMPS_NS::FixContactHistory& fix);
+
+/// Whether pairs within the group are excluded from neighbour lists already.
+bool excludes_group(const LAMMPS_NS::Neighbor& neighbor, int group);
+/// Takes `neigh_modify exclude group G G` back, leaving the user's own exclusions as they are.
+void include_group_again(LAMMPS_NS::Neighbor& neighbor, int group);
+
+/// Whether the fix renumbers all granules when it inserts (compress_tags).
+bool compresses_tags(const LAMMPS_NS::FixInsert& fix);
+/// Thermo output stops the run when it counts fewer atoms than the time before ("Lost atoms"): tells it of atoms that went into
+/// the store (negative) or came back, so that truly lost ones are still found.
+void expect_atoms(LAMMPS_NS::Thermo& thermo, long change);
+/// The region that an insert/pack or insert/rate fix fills.
+const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::Fix* fix);
+
+}  // namespace solidcull::engine

@@ -1,0 +1,498 @@
+#include "fix_solid_cull.h"
+
+#include <mpi.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <thread>
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "error.h"
+#include "fix_gravity.h"
+#include "fix_insert.h"
+#include "force.h"
+#include "group.h"
+#include "input_error.h"
+#include "memory.h"
+#include "modify.h"
+#include "neigh_list.h"
+#include "neighbor.h"
+#include "pair_gran.h"
+#include "update.h"
+
+namespace solidcull {
+namespace {
+
+// waking granules are handled together after so many steps: a sound wave crosses one granule in about that time
+constexpr int wake_together = 10;
+// pores of a packing hold no ball of this radius (in mean diameters); a hole that holds one is open to the outside
+constexpr double closing_diameters = 0.6;
+constexpr double standard_gravity = 9.81;  // m/s^2, the scale where the deck has none
+
+Vec3 vec(const double* v) { return Vec3(v[0], v[1], v[2]); }
+void clear(double* to) { to[0] = to[1] = to[2] = 0; }
+
+Settings parse(int narg, char** arg, LAMMPS_NS::Error* error, const char* id) {
+  try {
+    return parse_settings(std::vector<std::string>(arg + 3, arg + narg));
+  } catch (const InputError& e) {
+    const std::string line = "fix " + std::string(id) + " solid/cull: " + e.what();
+    error->all(__FILE__, __LINE__, line.c_str());
+  }
+  return {};
+}
+
+}  // namespace
+
+FixSolidCull::FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
+    : Fix(lmp, narg, arg),
+      settings_(parse(narg, arg, error, arg[0])),
+      halo_(lmp),
+      histories_(lmp),
+      records_(lmp, this),
+      pair_force_(lmp),
+      walls_(lmp) {
+  if (domain->triclinic) refuse("the box is triclinic: use an orthogonal one");
+  if (force->newton_pair) refuse("newton is on: put 'newton off' at the top of the deck");
+  if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->sphere_flag)
+    refuse("atom style '" + std::string(atom->atom_style) + "' has no granules: use atom_style granular");
+  if (!atom->tag_enable) refuse("atoms have no tags: put 'atom_modify id yes' into the deck");
+  for (int f = 0; f < modify->nfix; ++f)
+    if (modify->fix[f] && std::strcmp(modify->fix[f]->style, style) == 0 && std::strcmp(modify->fix[f]->id, id) != 0)
+      refuse("fix " + std::string(modify->fix[f]->id) + " is a solid/cull already: give one fix a group that holds all granules");
+
+  scalar_flag = 1;
+  vector_flag = 1;
+  size_vector = 12;
+  global_freq = 1;
+  extscalar = 1;
+  extvector = 0;
+  peratom_flag = 1;
+  size_peratom_cols = 0;
+  peratom_freq = 1;
+  force_reneighbor = 1;
+  next_reneighbor = -1;
+  nevery = 1;
+  restart_global = 1;
+  restart_peratom = 1;
+  create_attribute = 1;
+
+  const std::string name = std::string(id) + "_interface";
+  interface_group_ = group->find(name.c_str());
+  if (interface_group_ < 0) {
+    if (group->ngroup >= 32) refuse("all 32 groups are taken and interface granules need one: delete a group");
+    std::vector<std::string> words = {name, "subtract", "all", "all"};
+    std::vector<char*> args;
+    for (std::string& w : words) args.push_back(&w[0]);
+    group->assign(static_cast<int>(args.size()), args.data());
+    interface_group_ = group->find(name.c_str());
+  }
+  if (!engine::excludes_group(*neighbor, interface_group_)) {
+    std::vector<std::string> words = {"exclude", "group", name, name};
+    std::vector<char*> args;
+    for (std::string& w : words) args.push_back(&w[0]);
+    neighbor->modify_params(static_cast<int>(args.size()), args.data());
+  }
+
+  largest_radius_by_type_.assign(atom->ntypes + 1, 0.0);
+  vector_atom = nullptr;
+  grow_arrays(atom->nmax);
+  for (int i = 0; i < atom->nmax; ++i) set_arrays(i);
+  atom->add_callback(0);
+  atom->add_callback(1);
+  set_geometry_threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / comm->nprocs));
+}
+
+FixSolidCull::~FixSolidCull() {
+  atom->delete_callback(id, 0);
+  atom->delete_callback(id, 1);
+  memory->destroy(vector_atom);
+}
+
+int FixSolidCull::setmask() {
+  using namespace LAMMPS_NS::FixConst;
+  return PRE_INITIAL_INTEGRATE | PRE_EXCHANGE | PRE_NEIGHBOR | PRE_FINAL_INTEGRATE | END_OF_STEP;
+}
+
+void FixSolidCull::refuse(const std::string& why) {
+  const std::string line = "fix " + std::string(id) + " solid/cull: " + why;
+  error->all(__FILE__, __LINE__, line.c_str());
+}
+
+void FixSolidCull::say(const std::string& line) const {
+  if (comm->me != 0) return;
+  for (FILE* to : {screen, logfile})
+    if (to) std::fprintf(to, "%s\n", line.c_str());
+}
+
+bool FixSolidCull::any_rank(bool here) const {
+  if (comm->nprocs == 1) return here;
+  int mine = here, anywhere = 0;
+  MPI_Allreduce(&mine, &anywhere, 1, MPI_INT, MPI_MAX, world);
+  return anywhere != 0;
+}
+
+double FixSolidCull::closing() const { return closing_diameters * diameter_; }
+
+double FixSolidCull::surface_reach() const {
+  return settings_.depth * diameter_ + 2 * closing() + 0.5 * contact_reach();
+}
+
+void FixSolidCull::pre_delete(bool unfix) {
+  if (!unfix) return;
+  if (store_) restore_all();
+  engine::include_group_again(*neighbor, interface_group_);
+}
+
+// ------------------------------------------------------------------------------------------------- at the start of a run
+
+void FixSolidCull::refuse_what_cannot_be_culled() {
+  if (force->newton_pair) refuse("newton is on: put 'newton off' at the top of the deck");
+  if (std::strstr(update->integrate_style, "verlet") == nullptr)
+    refuse("run_style '" + std::string(update->integrate_style) + "' is not supported: use run_style verlet");
+  if (!force->pair || std::strncmp(force->pair_style, "gran", 4) != 0)
+    refuse("pair_style '" + std::string(force->pair_style) + "' is not granular: use pair_style gran");
+  if (domain->box_change_size || domain->box_change_shape)
+    refuse("the box changes its size (fix deform, press/berendsen, ...): a culled bed cannot follow; leave that fix out");
+  const auto* pair = static_cast<LAMMPS_NS::PairGran*>(force->pair);
+  if (pair->storeContactForces()) refuse("contact forces are stored per contact (store_force_contact): those of culled granules would be missing");
+
+  struct Physics {
+    const char* style;
+    const char* why;
+  };
+  // physics that culled granules would miss; the styles are prefixes
+  static const Physics missed[] = {
+      {"heat/gran", "heat conduction would miss the culled granules"},
+      {"couple/cfd", "CFD coupling would miss the culled granules"},
+      {"sph/", "SPH would miss the culled granules"},
+      {"adapt", "radii that change (fix adapt) would leave the culled granules behind"},
+      {"multisphere", "multisphere clumps are not supported yet"},
+      {"rigid", "rigid clumps of granules are not supported yet"},
+      {"nve/asphere", "aspherical granules are not supported"},
+      {"nve/superquadric", "superquadric granules are not supported"},
+      {"deform", "the box changes its size: a culled bed cannot follow"},
+      {"bond", "bonds would miss the culled granules"},
+  };
+  for (int f = 0; f < modify->nfix; ++f) {
+    const LAMMPS_NS::Fix* fix = modify->fix[f];
+    for (const Physics& p : missed)
+      if (std::strncmp(fix->style, p.style, std::strlen(p.style)) == 0)
+        refuse("fix " + std::string(fix->id) + " " + fix->style + ": " + p.why + "; leave one of the two fixes out");
+    if (std::strncmp(fix->style, "insert/", 7) == 0 && engine::compresses_tags(*static_cast<const LAMMPS_NS::FixInsert*>(fix)))
+      refuse("fix " + std::string(fix->id) + " " + fix->style +
+             ": compress_tags would renumber granules that are culled; say 'compress_tags no'");
+  }
+}
+
+Vec3 FixSolidCull::gravity() const {
+  Vec3 g = Vec3::Zero();
+  for (int f = 0; f < modify->nfix; ++f)
+    if (std::strcmp(modify->fix[f]->style, "gravity") == 0) {
+      double one[3];
+      static_cast<LAMMPS_NS::FixGravity*>(modify->fix[f])->get_gravity(one);
+      g += vec(one);
+    }
+  return g;
+}
+
+void FixSolidCull::find_scales() {
+  if (diameter_ == 0) {
+    double sums[2] = {0, 0};
+    for (int i = 0; i < atom->nlocal; ++i)
+      if (atom->mask[i] & groupbit) {
+        sums[0] += 2 * atom->radius[i];
+        sums[1] += 1;
+      }
+    MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPI_DOUBLE, MPI_SUM, world);
+    if (sums[1] > 0) diameter_ = sums[0] / sums[1];
+  }
+  const double g = gravity().norm();
+  if (g > 0) weight_scale_ = g;
+  if (weight_scale_ == 0) {
+    weight_scale_ = standard_gravity;
+    say("fix " + std::string(id) + " solid/cull: the deck has no fix gravity; 'speed' and 'tolerance' are measured with 9.81 m/s^2");
+  }
+  if (diameter_ == 0) return;  // an empty box: the first granules set the scale
+  const double d = diameter_;
+  look_every_ = settings_.every ? settings_.every : look_interval(d, weight_scale_, update->dt);
+  solid_state_ = {settings_.speed * std::sqrt(weight_scale_ * d),
+                  SolidStateLaw::out_of_balance_share * std::max(settings_.tolerance_absolute, 1.0), weight_scale_, settings_.calm};
+  wake_up_ = {settings_.tolerance_absolute, settings_.tolerance_relative, weight_scale_, settings_.carve_radius * d,
+              settings_.carve_cap};
+  if (!store_) store_ = std::make_unique<GranuleStore>(2 * d);
+  if (!surface_)
+    surface_ = std::make_unique<ImplicitSurface>(
+        settings_.voxel * d, closing(), [this](const Vec3& lo, const Vec3& hi, const std::function<void(const Sphere&)>& visit) {
+          const auto from_cells = [&](const SphereCells& cells) {
+            const Vec3 reach = Vec3::Constant(cells.largest_radius() + closing());
+            cells.for_each_in_box(lo - reach, hi + reach, [&](std::size_t, const Sphere& s) {
+              visit(s);
+              return true;
+            });
+          };
+          from_cells(around_);
+          from_cells(plug_cells_);
+          const Vec3 reach = Vec3::Constant(store_->largest_radius() + closing());
+          store_->for_each_in_box(lo - reach, hi + reach, [&](const StoredGranule& g) { visit({g.position, g.radius}); });
+        });
+}
+
+void FixSolidCull::init() {
+  refuse_what_cannot_be_culled();
+  histories_.connect();
+  walls_.connect();
+  contacts_.set_layout(histories_.flips());
+  halo_.update();
+  new_run_ = true;
+}
+
+double FixSolidCull::max_rad(int type) {
+  return type >= 0 && type < static_cast<int>(largest_radius_by_type_.size()) ? largest_radius_by_type_[type] : 0.0;
+}
+
+void FixSolidCull::setup_pre_exchange() {
+  find_scales();
+  if (!store_) return;
+  if (!restart_state_.empty()) take_up_restart_state();
+  open_for_insertion();
+  change_membership();
+  new_run_ = false;
+}
+
+void FixSolidCull::setup(int) {
+  // fixes after this one add their forces later: the loads are taken at the start of the first step
+  after_setup_ = true;
+}
+
+void FixSolidCull::pre_initial_integrate() {
+  if (!after_setup_) return;
+  after_setup_ = false;
+  if (!store_) return;
+  take_loads();
+  const Vec3 g = gravity();
+  if (any_rank(!locked_index_.empty()) && gravity_changed(g, gravity_at_locking_)) {
+    say("fix " + std::string(id) + " solid/cull: gravity has changed; all granules wake");
+    wake_all_ = true;
+    next_reneighbor = update->ntimestep;
+  }
+  see_walls();
+  wake_where_walls_are_gone();
+  if (any_rank(!waking_.empty())) next_reneighbor = update->ntimestep;
+  if (next_look_ < update->ntimestep) next_look_ = ((update->ntimestep - 1) / look_every_ + 1) * look_every_;
+}
+
+// ------------------------------------------------------------------------------------------------------------ the time step
+
+void FixSolidCull::pre_exchange() {
+  if (!store_) return;
+  if (any_rank(halo_.subdomain_changed())) {
+    halo_.update();
+    move_home();
+  }
+  change_membership();
+}
+
+void FixSolidCull::pre_neighbor() {
+  locked_index_stale_ = true;
+  if (!store_) return;
+  if (halo_.needed()) {
+    ghost_interface_.clear();
+    const int bit = group->bitmask[interface_group_];
+    for (int i = atom->nlocal; i < atom->nlocal + atom->nghost; ++i)
+      if (atom->mask[i] & bit) ghost_interface_[atom->tag[i]] = 1;
+  }
+  check_inserted();
+}
+
+void FixSolidCull::take_loads() {
+  const auto timed = watch_.time(Part::load);
+  if (locked_index_stale_) {
+    locked_index_.clear();
+    for (int i = 0; i < atom->nlocal; ++i)
+      if (shell_[i].locked) locked_index_.push_back(i);
+    locked_index_stale_ = false;
+  }
+  if (thawed_) rebase_thawed_contacts();
+  largest_excess_ = 0;
+  double** force = atom->f;
+  for (const int i : locked_index_) {
+    ShellEntry& e = shell_[i];
+    const Vec3 load = vec(force[i]);
+    if (e.fresh) {
+      e.reference = load - e.load_change;
+      e.fresh = false;
+    }
+    e.load_change = load - e.reference;
+    const double tolerance = wake_up_.tolerance(atom->rmass[i], e.normal_load);
+    const double square = e.load_change.squaredNorm();
+    if (square > e.excess * e.excess * tolerance * tolerance) e.excess = std::sqrt(square) / tolerance;
+    largest_excess_ = std::max(largest_excess_, e.excess);
+    clear(force[i]);
+    clear(atom->torque[i]);
+  }
+}
+
+void FixSolidCull::rebase_thawed_contacts() {
+  // a contact that came out of the body brings the load that it had inside: no change for the granule that stays (invariant I5)
+  thawed_ = false;
+  const int owned = atom->nlocal;
+  const LAMMPS_NS::NeighList* list = force->pair->list;
+  for (int row = 0; row < list->inum; ++row) {
+    const int i = list->ilist[row];
+    if (i >= owned) continue;
+    const bool freed = freed_anywhere_.contains(atom->tag[i]);
+    const bool stays = shell_[i].locked && !shell_[i].fresh;
+    if (!freed && !stays) continue;
+    for (int k = 0; k < list->numneigh[i]; ++k) {
+      const int j = list->firstneigh[i][k] & NEIGHMASK;
+      const bool other_freed = freed_anywhere_.contains(atom->tag[j]);
+      const bool other_stays = j < owned && shell_[j].locked && !shell_[j].fresh;
+      if (!(stays && other_freed) && !(freed && other_stays)) continue;
+      const double reach = (atom->radius[i] + atom->radius[j]) * neighbor->contactDistanceFactor;
+      if ((vec(atom->x[i]) - vec(atom->x[j])).squaredNorm() > reach * reach) continue;
+      const Vec3 f = pair_force_.on_first(i, k);
+      if (stays && other_freed) shell_[i].reference += f;
+      if (freed && other_stays) shell_[j].reference -= f;
+    }
+  }
+}
+
+void FixSolidCull::ask_for_reneighbouring_if_waking() {
+  const bool time = update->ntimestep % wake_together == 0;
+  if (!time) return;
+  bool waking = false;
+  for (const int i : locked_index_) {
+    ShellEntry& e = shell_[i];
+    if (e.excess > 1) {
+      waking_.push_back({vec(atom->x[i]), wake_up_.radius(e.excess)});
+      waking = true;
+    }
+    e.excess = 0;
+  }
+  if (any_rank(waking)) next_reneighbor = update->ntimestep + 1;
+}
+
+void FixSolidCull::pre_final_integrate() {
+  if (!store_) return;
+  take_loads();
+  ask_for_reneighbouring_if_waking();
+  if (update->ntimestep == next_look_) {
+    look();
+    const Vec3 g = gravity();
+    if (any_rank(!locked_index_.empty()) && gravity_changed(g, gravity_at_locking_)) {
+      wake_all_ = true;
+      next_reneighbor = update->ntimestep + 1;
+    }
+    if (any_rank(!waking_.empty())) next_reneighbor = update->ntimestep + 1;
+  }
+  if (stored_everywhere_ > 0) open_for_insertion();
+}
+
+void FixSolidCull::end_of_step() {
+  if (!store_) return;
+  const auto due = [&](int every) { return every > 0 && update->ntimestep % every == 0; };
+  if (due(settings_.mesh_every)) write_mesh_files();
+  if (due(settings_.bed_every)) write_bed_file();
+}
+
+// ------------------------------------------------------------------------------------------------------------ numbers
+
+double FixSolidCull::compute_scalar() { return compute_vector(2); }
+
+double FixSolidCull::compute_vector(int n) {
+  if (totals_.empty() || totals_step_ != update->ntimestep || totals_version_ != membership_version_) {
+    totals_step_ = update->ntimestep;
+    totals_version_ = membership_version_;
+    totals_.assign(12, 0.0);
+    const std::map<int, int> number = global_bodies();
+    double bodies = static_cast<double>(bodies_.size());
+    if (comm->nprocs > 1) {
+      bodies = 0;
+      for (const auto& b : number) bodies += b.second == b.first * comm->nprocs + comm->me;
+    }
+    double interface = 0;
+    for (int i = 0; i < atom->nlocal; ++i) interface += shell_[i].locked;
+    double sums[9] = {atom->nlocal - interface,
+                      interface,
+                      store_ ? static_cast<double>(store_->size()) : 0.0,
+                      bodies,
+                      store_ ? store_->mass() : 0.0,
+                      static_cast<double>(ledger_.granules_locked()),
+                      static_cast<double>(ledger_.granules_restored()),
+                      store_ ? ledger_.mass_error(*store_) : 0.0,
+                      ledger_.energy_added()};
+    MPI_Allreduce(MPI_IN_PLACE, sums, 9, MPI_DOUBLE, MPI_SUM, world);
+    double largest[2] = {largest_excess_, watch_.total()};
+    MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, world);
+    totals_ = {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], static_cast<double>(ledger_.carves()),
+               largest[0], largest[1], sums[7], sums[8]};
+  }
+  return n >= 0 && n < 12 ? totals_[n] : 0.0;
+}
+
+double FixSolidCull::memory_usage() {
+  double bytes = static_cast<double>(shell_.capacity() * sizeof(ShellEntry) + contacts_.memory_bytes());
+  if (store_) bytes += static_cast<double>(store_->memory_bytes());
+  return bytes;
+}
+
+void FixSolidCull::post_run() {
+  if (!store_) return;
+  static const char* names[] = {"load", "look", "depth", "membership", "shell", "mesh", "files"};
+  double seconds[static_cast<int>(Part::count)];
+  for (int p = 0; p < static_cast<int>(Part::count); ++p) seconds[p] = watch_.seconds(static_cast<Part>(p));
+  MPI_Allreduce(MPI_IN_PLACE, seconds, static_cast<int>(Part::count), MPI_DOUBLE, MPI_MAX, world);
+  totals_.clear();
+  compute_vector(0);
+  char text[512];
+  std::snprintf(text, sizeof text,
+                "fix %s solid/cull: %.0f exterior, %.0f interface, %.0f interior granules in %.0f bodies; culled %.0f, restored %.0f, "
+                "carves %.0f; mass error %.3g kg, energy added %.3g J",
+                id, totals_[0], totals_[1], totals_[2], totals_[3], totals_[5], totals_[6], totals_[7], totals_[10], totals_[11]);
+  say(text);
+  double total = 0;
+  std::string parts;
+  for (int p = 0; p < static_cast<int>(Part::count); ++p) {
+    total += seconds[p];
+    std::snprintf(text, sizeof text, "%s%s %.3g", p ? ", " : "", names[p], seconds[p]);
+    parts += text;
+  }
+  std::snprintf(text, sizeof text, "fix %s solid/cull: %.4g s in the fix since it was made: %s", id, total, parts.c_str());
+  say(text);
+}
+
+// ------------------------------------------------------------------------------------------------------------ per atom
+
+void FixSolidCull::grow_arrays(int nmax) {
+  shell_.resize(nmax);
+  memory->grow(vector_atom, nmax, "solid_cull:body");
+}
+
+void FixSolidCull::copy_arrays(int from, int to, int) {
+  shell_[to] = shell_[from];
+  vector_atom[to] = vector_atom[from];
+}
+
+void FixSolidCull::set_arrays(int i) {
+  shell_[i] = ShellEntry();
+  vector_atom[i] = 0;
+}
+
+int FixSolidCull::pack_exchange(int i, double* buffer) {
+  shell_[i].pack(buffer);
+  buffer[ShellEntry::packed_size] = vector_atom[i];
+  return ShellEntry::packed_size + 1;
+}
+
+int FixSolidCull::unpack_exchange(int i, double* buffer) {
+  shell_[i] = ShellEntry::unpack(buffer);
+  vector_atom[i] = buffer[ShellEntry::packed_size];
+  return ShellEntry::packed_size + 1;
+}
+
+}  // namespace solidcull

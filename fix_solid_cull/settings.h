@@ -1,0 +1,46 @@
+// The keywords of `fix solid/cull` (DESIGN section 11).
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace solidcull {
+
+enum class Exterior { live };
+enum class Motion { fixed };
+enum class Walls { closed, surface };
+enum class Store { exact };
+enum class Restore { exact };
+
+struct Settings {
+  int every = 0;                 ///< steps between looks; 0: from the deck's own scales, see look_interval()
+  double depth = 2.0;            ///< cover, in mean granule diameters
+  Exterior exterior = Exterior::live;
+  double speed = 0.02;           ///< solid-state tolerance, fraction of sqrt(g d)
+  int calm = 3;                  ///< looks in a row
+  double tolerance_absolute = 3; ///< A of the wake-up law, in granule weights
+  double tolerance_relative = 0; ///< R of the wake-up law, in normal loads at locking
+  double carve_radius = 2.0;     ///< r0, in mean diameters
+  double carve_cap = 4.0;        ///< largest growth of r0
+  Motion motion = Motion::fixed;
+  Walls walls = Walls::closed;
+  Store store = Store::exact;
+  Restore restore = Restore::exact;
+  double voxel = 0.5;            ///< in mean diameters
+  int mesh_every = 0;            ///< 0: no mesh files
+  std::string mesh_file;
+  int bed_every = 0;             ///< 0: no bed files
+  std::string bed_file;
+};
+
+/// Parses `keyword value ...`. Throws InputError that names keyword and value as typed, and what to do.
+Settings parse_settings(const std::vector<std::string>& words);
+
+/// The keywords that parse_settings knows, for the test that holds the command page and the code together.
+std::vector<std::string> setting_keywords();
+
+/// Steps between looks when the deck names none: a tenth of sqrt(d/g), the time in which a granule falls about its own radius
+/// over a hundred; at least 10, at most 1000. d in m, g in m/s^2, dt in s.
+int look_interval(double mean_diameter, double gravity, double dt);
+
+}  // namespace solidcull

@@ -1,0 +1,31 @@
+// When an interface granule wakes, and how much of the body it takes along (DESIGN section 8).
+#pragma once
+
+#include "sphere.h"
+
+namespace solidcull {
+
+/// The error control: an absolute and a relative tolerance, as in an ODE solver.
+struct WakeUpLaw {
+  double absolute;       ///< A, in granule weights
+  double relative;       ///< R, in normal loads at locking
+  double gravity;        ///< |g| in m/s^2
+  double carve_radius;   ///< r0 in m
+  double carve_cap;      ///< largest growth of r0
+  static constexpr double growth = 0.5;  ///< c of the carve law
+
+  /// Largest load change (N) that a granule of this mass (kg) and normal load at locking (N) sleeps through.
+  double tolerance(double mass, double normal_load) const { return absolute * mass * gravity + relative * normal_load; }
+
+  /// |F_ext - F_ext(at locking)| over the tolerance; the granule wakes above 1.
+  double excess(const Vec3& load, const Vec3& load_at_locking, double mass, double normal_load) const;
+
+  /// Radius (m) of the ball that a waking granule carves: r0 (1 + c log2(excess)), at most cap r0. excess >= 1.
+  double radius(double excess) const;
+};
+
+/// Gravity as the granules of a body feel it may change by this fraction of its size (in size or direction) before all wake.
+constexpr double effective_gravity_fraction = 0.05;
+bool gravity_changed(const Vec3& now, const Vec3& at_locking);
+
+}  // namespace solidcull

@@ -1,0 +1,417 @@
+#include "interface_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <variant>
+
+#include <openvdb/openvdb.h>
+#include <openvdb/io/Stream.h>
+#include <openvdb/tools/Composite.h>
+#include <openvdb/tools/Interpolation.h>
+#include <openvdb/tools/LevelSetSphere.h>
+#include <openvdb/tools/MeshToVolume.h>
+#include <openvdb/tools/ParticlesToLevelSet.h>
+#include <openvdb/tools/Prune.h>
+#include <openvdb/tools/SignedFloodFill.h>
+#include <openvdb/tools/VolumeToMesh.h>
+#include <openvdb/tree/LeafManager.h>
+#include <tbb/global_control.h>
+
+#include "mesh_files.h"
+#include "whole_file.h"
+
+namespace solidcull {
+
+namespace {
+
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+
+constexpr float band = 3.0f;  // half width of the narrow band, in voxels
+
+/// A sphere of more than half a voxel's diagonal holds a voxel centre wherever it lies; smaller ones could vanish from the grid.
+constexpr double smallest_radius = 0.9;  // voxels
+
+/// OpenVDB skips spheres below this radius in createLevelSetSphere.
+constexpr double nyquist_radius = 1.5;  // voxels
+
+/// A queue longer than this is worked off without a question, so that a run that never asks does not grow for ever (32 B each).
+constexpr std::size_t queue_limit = 4'000'000;  // spheres
+
+void start_openvdb() {
+  static std::once_flag once;
+  std::call_once(once, [] { openvdb::initialize(); });
+}
+
+FloatGrid::Ptr new_level_set(double voxel) {
+  auto grid = FloatGrid::create(static_cast<float>(voxel) * band);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  return grid;
+}
+
+/// Spheres as ParticlesToLevelSet wants them, each grown by `growth` (m).
+struct GrownSpheres {
+  using PosType = openvdb::Vec3R;
+  const std::vector<Sphere>& spheres;
+  double growth;
+
+  std::size_t size() const { return spheres.size(); }
+  void getPos(std::size_t n, PosType& position) const {
+    const Vec3& c = spheres[n].centre;
+    position = PosType(c.x(), c.y(), c.z());
+  }
+  void getPosRad(std::size_t n, PosType& position, openvdb::Real& radius) const {
+    getPos(n, position);
+    radius = spheres[n].radius + growth;
+  }
+};
+
+/// The union of the spheres, each grown by `growth`: exact distances outside, the depth in the deepest sphere inside.
+FloatGrid::Ptr rasterise(const std::vector<Sphere>& spheres, double growth, double voxel) {
+  auto grid = new_level_set(voxel);
+  openvdb::tools::ParticlesToLevelSet<FloatGrid> raster(*grid);
+  raster.setRmin(0.0);  // the default drops what is smaller than 1.5 voxels, or larger than 100
+  raster.setRmax(std::numeric_limits<float>::max());
+  raster.rasterizeSpheres(GrownSpheres{spheres, growth});
+  raster.finalize(/*prune=*/true);
+  if (raster.getMinCount() + raster.getMaxCount() != 0)
+    throw std::logic_error("InterfaceMesh: " + std::to_string(raster.getMinCount() + raster.getMaxCount()) +
+                           " spheres were dropped from the level set");
+  return grid;
+}
+
+/// Moves the surface of a union of spheres that were grown by `closing` back by `closing`.
+///
+/// Inside such a union the stored depth is that in the deepest sphere, not that below the union's surface, so it cannot be shifted
+/// as it is; and re-normalising the whole inside costs a sweep per fraction of a voxel. The distance to the union's surface is
+/// taken from its triangles instead, which touches only the band along the surface. The sign comes from the union itself, so inner
+/// cavities stay open and inner seams count for nothing.
+FloatGrid::Ptr shrink(const FloatGrid& grown, double closing, double voxel) {
+  using namespace openvdb;
+  std::vector<Vec3s> points;
+  std::vector<Vec3I> triangles;
+  std::vector<Vec4I> quads;
+  tools::volumeToMesh(grown, points, triangles, quads, 0.0);
+
+  const auto reach = static_cast<float>(closing / voxel) + band + 1.0f;
+  const FloatGrid::Ptr shrunk =
+      tools::meshToUnsignedDistanceField<FloatGrid>(grown.transform(), points, triangles, quads, reach);
+  shrunk->setGridClass(GRID_LEVEL_SET);
+
+  const float width = static_cast<float>(voxel) * band, back = static_cast<float>(closing);
+  tree::LeafManager<FloatTree> leaves(shrunk->tree());
+  leaves.foreach([&](FloatTree::LeafNodeType& leaf, std::size_t) {
+    tree::ValueAccessor<const FloatTree, /*IsSafe=*/false> union_at(grown.tree());
+    for (Index n = 0; n < FloatTree::LeafNodeType::SIZE; ++n) {
+      const float from_union = union_at.getValue(leaf.offsetToGlobalCoord(n));
+      // Inside, `min` keeps each granule's own sphere whole where the triangles are coarser than it.
+      const bool outside = from_union >= 0.0f;
+      const float to_surface = leaf.isValueOn(n) ? leaf.getValue(n) : std::numeric_limits<float>::infinity();
+      const float value = outside ? from_union + back : std::min(back - to_surface, from_union + back);
+      if (std::abs(value) < width) leaf.setValueOn(n, value);
+      else leaf.setValueOff(n, value < 0.0f ? -width : width);
+    }
+  });
+  shrunk->tree().root().setBackground(width, /*updateChildNodes=*/false);
+  tools::signedFloodFill(shrunk->tree());
+  tools::pruneLevelSet(shrunk->tree());
+  return shrunk;
+}
+
+FloatGrid::Ptr ball(const Sphere& s, double voxel) {
+  if (s.radius < nyquist_radius * voxel) return rasterise({s}, 0.0, voxel);
+  const openvdb::Vec3f centre(openvdb::Vec3d(s.centre.x(), s.centre.y(), s.centre.z()));
+  return openvdb::tools::createLevelSetSphere<FloatGrid>(static_cast<float>(s.radius), centre,
+                                                         static_cast<float>(voxel), band);
+}
+
+void check(const Sphere& s, const char* what) {
+  if (s.centre.allFinite() && std::isfinite(s.radius) && s.radius > 0) return;
+  throw std::invalid_argument(std::string("InterfaceMesh: ") + what + " at (" + std::to_string(s.centre.x()) + ", " +
+                              std::to_string(s.centre.y()) + ", " + std::to_string(s.centre.z()) + ") with radius " +
+                              std::to_string(s.radius) + " is no sphere");
+}
+
+}  // namespace
+
+struct InterfaceMesh::Impl {
+  struct Addition {
+    std::vector<Sphere> granules, context;
+  };
+  using Operation = std::variant<Addition, Sphere, std::unique_ptr<Impl>>;  // add, carve, merge
+
+  double voxel, closing;
+  FloatGrid::Ptr stored;
+  std::vector<Operation> queue;
+  std::size_t queued_spheres = 0;
+  std::size_t leaves_when_pruned = 0;
+
+  struct Box {
+    Vec3 lo, hi;
+  };
+  std::optional<Box> box;           // answers that cost a pass over the grid, kept until it changes
+  std::optional<double> enclosed;
+
+  Impl(double voxel_, double closing_) : voxel(voxel_), closing(closing_) {
+    start_openvdb();
+    stored = new_level_set(voxel);
+  }
+
+  void enqueue(Operation op, std::size_t spheres) {
+    queue.push_back(std::move(op));
+    queued_spheres += spheres;
+    if (queued_spheres > queue_limit) apply();
+  }
+
+  FloatGrid& grid() {
+    if (!queue.empty()) apply();
+    return *stored;
+  }
+
+  void apply() {
+    // One after another and never two additions as one: what the mesh is may not depend on when it was asked for.
+    for (Operation& op : queue) {
+      if (auto* addition = std::get_if<Addition>(&op)) unite(*additional_solid(*addition));
+      else if (auto* carved = std::get_if<Sphere>(&op)) subtract(*carved);
+      else unite(std::get<std::unique_ptr<Impl>>(op)->grid());
+    }
+    queue.clear();
+    queued_spheres = 0;
+    box.reset();
+    enclosed.reset();
+    prune_when_due();
+  }
+
+  FloatGrid::Ptr additional_solid(Addition& a) const {
+    for (auto* spheres : {&a.granules, &a.context})
+      for (Sphere& s : *spheres) s.radius = std::max(s.radius, smallest_radius * voxel);
+    if (closing == 0.0) return rasterise(a.granules, 0.0, voxel);
+    if (a.context.empty()) return shrink(*rasterise(a.granules, closing, voxel), closing, voxel);
+
+    std::vector<Sphere> all = a.granules;
+    all.insert(all.end(), a.context.begin(), a.context.end());
+    const FloatGrid::Ptr solid = shrink(*rasterise(all, closing, voxel), closing, voxel);
+    // A pore that the new granules close was void, so some ball of radius `closing` covered it whose centre now lies within
+    // r + closing of a new granule: no such point is farther than r + 2 closing from it. Beyond that nothing is to change.
+    openvdb::tools::csgIntersection(*solid, *rasterise(a.granules, 2.0 * closing, voxel), /*prune=*/false);
+    return solid;
+  }
+
+  // Pruning in each CSG would cost a pass over the whole body, however small the change.
+  void unite(FloatGrid& solid) { openvdb::tools::csgUnion(*stored, solid, /*prune=*/false); }
+  void subtract(const Sphere& s) { openvdb::tools::csgDifference(*stored, *ball(s, voxel), /*prune=*/false); }
+
+  void prune_when_due() {
+    constexpr std::size_t too_few_to_matter = 256;
+    const std::size_t leaves = stored->tree().leafCount();
+    if (leaves < too_few_to_matter || 2 * leaves < 3 * leaves_when_pruned) return;
+    openvdb::tools::pruneLevelSet(stored->tree());
+    leaves_when_pruned = stored->tree().leafCount();
+  }
+
+  double value_at(const openvdb::Vec3d& voxel_position) {
+    openvdb::tree::ValueAccessor<const FloatTree, /*IsSafe=*/false> at(grid().constTree());
+    return openvdb::tools::BoxSampler::sample(at, voxel_position);
+  }
+
+  openvdb::Vec3d in_voxels(const Vec3& p) const { return openvdb::Vec3d(p.x(), p.y(), p.z()) / voxel; }
+
+  const Box& bounding_box();
+};
+
+/// The box around the zero set of the trilinear field: each coordinate of that set is extreme on an edge between two voxel centres.
+const InterfaceMesh::Impl::Box& InterfaceMesh::Impl::bounding_box() {
+  const FloatTree& tree = grid().constTree();
+  if (box) return *box;
+  using openvdb::Coord;
+  Vec3 lo = Vec3::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
+  openvdb::tree::ValueAccessor<const FloatTree, /*IsSafe=*/false> at(tree);
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
+    for (auto value = leaf->cbeginValueOn(); value; ++value) {
+      if (*value >= 0.0f || *value < -voxel * 1.001) continue;
+      const Coord c = value.getCoord();
+      for (int d = 0; d < 3; ++d)
+        for (const int side : {-1, 1}) {
+          Coord next = c;
+          next[d] += side;
+          const float beyond = at.getValue(next);
+          if (beyond < 0.0f) continue;
+          const double crossing = (c[d] + side * (*value / (*value - beyond))) * voxel;
+          lo[d] = std::min(lo[d], crossing);
+          hi[d] = std::max(hi[d], crossing);
+        }
+    }
+  box = lo.allFinite() ? Box{lo, hi} : Box{Vec3::Zero(), Vec3::Zero()};
+  return *box;
+}
+
+InterfaceMesh::InterfaceMesh(double voxel, double closing) {
+  if (!(voxel > 0) || !std::isfinite(voxel))
+    throw std::invalid_argument("InterfaceMesh: voxel " + std::to_string(voxel) + " must be positive and finite");
+  if (!(closing >= 0) || !std::isfinite(closing))
+    throw std::invalid_argument("InterfaceMesh: closing " + std::to_string(closing) + " must be zero or more");
+  impl_ = std::make_unique<Impl>(voxel, closing);
+}
+
+InterfaceMesh::~InterfaceMesh() = default;
+InterfaceMesh::InterfaceMesh(InterfaceMesh&&) noexcept = default;
+InterfaceMesh& InterfaceMesh::operator=(InterfaceMesh&&) noexcept = default;
+
+void InterfaceMesh::add(const std::vector<Sphere>& granules, const std::vector<Sphere>& context) {
+  if (granules.empty()) return;
+  for (const Sphere& s : granules) check(s, "a granule");
+  for (const Sphere& s : context) check(s, "a granule");
+  impl_->enqueue(Impl::Addition{granules, context}, granules.size() + context.size());
+}
+
+void InterfaceMesh::carve(const Sphere& ball) {
+  check(ball, "a carving ball");
+  impl_->enqueue(ball, 1);
+}
+
+void InterfaceMesh::merge(InterfaceMesh&& other) {
+  if (&other == this) return;
+  if (other.impl_->voxel != impl_->voxel)
+    throw std::invalid_argument("InterfaceMesh: a mesh with voxel " + std::to_string(other.impl_->voxel) +
+                                " cannot join one with voxel " + std::to_string(impl_->voxel));
+  auto emptied = std::make_unique<Impl>(other.impl_->voxel, other.impl_->closing);
+  std::swap(emptied, other.impl_);
+  const std::size_t spheres = emptied->queued_spheres;
+  impl_->enqueue(std::move(emptied), spheres);
+}
+
+bool InterfaceMesh::empty() const {
+  const FloatTree& tree = impl_->grid().constTree();
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
+    for (openvdb::Index n = 0; n < FloatTree::LeafNodeType::SIZE; ++n)
+      if (leaf->getValue(n) < 0.0f) return false;
+  return true;
+}
+
+bool InterfaceMesh::inside(const Vec3& p) const { return signed_distance(p) < 0.0; }
+
+double InterfaceMesh::signed_distance(const Vec3& p) const { return impl_->value_at(impl_->in_voxels(p)); }
+
+Vec3 InterfaceMesh::normal(const Vec3& p) const {
+  const openvdb::Vec3d at = impl_->in_voxels(p);
+  Vec3 gradient;
+  for (int d = 0; d < 3; ++d) {
+    openvdb::Vec3d step(0.0);
+    step[d] = 0.5;
+    gradient[d] = impl_->value_at(at + step) - impl_->value_at(at - step);
+  }
+  const double steepness = gradient.norm();
+  return steepness > 0 ? Vec3(gradient / steepness) : Vec3(Vec3::Zero());
+}
+
+void InterfaceMesh::bounds(Vec3& lo, Vec3& hi) const {
+  const Impl::Box& box = impl_->bounding_box();
+  lo = box.lo;
+  hi = box.hi;
+}
+
+/// From the triangles (divergence theorem), so that it is the volume of what the user sees and sums up exactly over seams inside.
+double InterfaceMesh::volume() const {
+  impl_->grid();
+  if (impl_->enclosed) return *impl_->enclosed;
+  const TriangleMesh mesh = triangles();
+  double six_volumes = 0.0;
+  if (!mesh.vertices.empty()) {
+    const Vec3 near = mesh.vertices.front();  // a body far from the origin would lose digits
+    for (const auto& t : mesh.triangles)
+      six_volumes += (mesh.vertices[t[0]] - near).dot(
+          (mesh.vertices[t[1]] - near).cross(mesh.vertices[t[2]] - near));
+  }
+  impl_->enclosed = six_volumes / 6.0;
+  return *impl_->enclosed;
+}
+
+double InterfaceMesh::half_width() const { return impl_->stored->background(); }
+
+TriangleMesh InterfaceMesh::triangles(double adaptivity) const {
+  std::vector<openvdb::Vec3s> points;
+  std::vector<openvdb::Vec3I> threes;
+  std::vector<openvdb::Vec4I> fours;
+  openvdb::tools::volumeToMesh(impl_->grid(), points, threes, fours, 0.0, adaptivity);
+
+  TriangleMesh mesh;
+  mesh.vertices.reserve(points.size());
+  for (const openvdb::Vec3s& p : points) mesh.vertices.emplace_back(p.x(), p.y(), p.z());
+  mesh.triangles.reserve(threes.size() + 2 * fours.size());
+  // OpenVDB winds its polygons the other way round.
+  for (const openvdb::Vec3I& t : threes) mesh.triangles.push_back({t[0], t[2], t[1]});
+  for (const openvdb::Vec4I& q : fours) {
+    mesh.triangles.push_back({q[0], q[2], q[1]});
+    mesh.triangles.push_back({q[0], q[3], q[2]});
+  }
+  return mesh;
+}
+
+std::string InterfaceMesh::to_bytes() const {
+  impl_->grid();
+  std::ostringstream out(std::ios::binary);
+  openvdb::io::Stream(out).write(openvdb::GridCPtrVec{impl_->stored});
+  return out.str();
+}
+
+InterfaceMesh InterfaceMesh::from_bytes(const std::string& bytes, double voxel, double closing) {
+  InterfaceMesh mesh(voxel, closing);
+  FloatGrid::Ptr grid;
+  try {
+    std::istringstream in(bytes, std::ios::binary);
+    const openvdb::GridPtrVecPtr grids = openvdb::io::Stream(in, /*delayLoad=*/false).getGrids();
+    if (grids && grids->size() == 1) grid = openvdb::gridPtrCast<FloatGrid>(grids->front());
+  } catch (const std::exception& e) {
+    throw std::runtime_error(std::string("InterfaceMesh: these bytes are no interface mesh: ") + e.what());
+  }
+  if (!grid) throw std::runtime_error("InterfaceMesh: these bytes are no interface mesh");
+  if (grid->transform() != mesh.impl_->stored->transform())
+    throw std::runtime_error("InterfaceMesh: these bytes hold a mesh with voxel " +
+                             std::to_string(grid->voxelSize()[0]) + ", not " + std::to_string(voxel));
+  mesh.impl_->stored = grid;
+  return mesh;
+}
+
+std::size_t InterfaceMesh::active_voxels() const { return impl_->grid().activeVoxelCount(); }
+
+std::size_t InterfaceMesh::memory_bytes() const {
+  return impl_->grid().memUsage() + impl_->queue.capacity() * sizeof(Impl::Operation);
+}
+
+void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>& meshes,
+               const std::vector<std::string>& names) {
+  if (meshes.size() != names.size())
+    throw std::invalid_argument("write_vdb: " + std::to_string(names.size()) + " names for " +
+                                std::to_string(meshes.size()) + " meshes");
+  start_openvdb();
+  WholeFile out(file);
+  out.close();  // OpenVDB opens the file by its name; that this is possible is known now, or the reason why not
+  openvdb::GridCPtrVec grids;
+  for (std::size_t n = 0; n < meshes.size(); ++n) {
+    meshes[n]->impl_->grid();
+    const auto named = meshes[n]->impl_->stored->copy();  // shares the tree
+    named->setName(names[n]);
+    grids.push_back(named);
+  }
+  try {
+    openvdb::io::File(out.part()).write(grids);
+  } catch (const std::exception& e) {
+    out.fail(e.what());
+  }
+  out.commit();
+}
+
+void set_geometry_threads(int n) {
+  if (n < 1) throw std::invalid_argument("set_geometry_threads: " + std::to_string(n) + " must be at least 1");
+  static std::unique_ptr<tbb::global_control> limit;
+  limit.reset();  // two controls at once would keep the smaller number
+  limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, n);
+}
+
+}  // namespace solidcull

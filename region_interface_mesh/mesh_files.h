@@ -1,0 +1,36 @@
+// Files for ParaView and other viewers. Every file is written whole or not at all: to FILE.part first, then renamed.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "interface_mesh.h"
+
+namespace solidcull {
+
+/// Binary STL; throws std::runtime_error naming the file and the reason if it cannot be written. Local.
+void write_stl(const std::string& file, const TriangleMesh& mesh);
+
+/// VTK XML PolyData of triangles with one Int32 cell array "body" (empty, or one value per triangle). Local.
+void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<int>& body_of_triangle);
+
+/// OpenVDB file with one level-set grid per mesh, named by `names`. Local.
+void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>& meshes,
+               const std::vector<std::string>& names);
+
+/// State of a granule in a bed file; the numbers stand in the file.
+enum class GranuleState : int { exterior = 0, interface_ = 1, interior = 2, waking = 3 };
+
+/// All granules of a bed, stored ones too, as columns of equal length (SI units, world frame).
+struct BedTable {
+  std::vector<float> position;      // 3 per granule
+  std::vector<float> velocity;      // 3 per granule
+  std::vector<float> radius;
+  std::vector<int> tag, type, state, body;
+};
+
+/// VTK XML PolyData of points (one vertex cell each) with point arrays radius, velocity, tag, type, state, body.
+/// Arrays are inline base64 ("binary"), header_type UInt64, uncompressed, little endian.
+void write_bed_vtp(const std::string& file, const BedTable& bed);
+
+}  // namespace solidcull
