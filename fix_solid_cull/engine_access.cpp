@@ -7,7 +7,6 @@
 #include "fix_insert.h"
 #include "fix_insert_pack.h"
 #include "modify.h"
-#include "neighbor.h"
 #include "thermo.h"
 
 namespace solidcull::engine {
@@ -27,9 +26,6 @@ struct Expose {
 using FixStyles = std::map<std::string, FixCreator>;
 SOLIDCULL_EXPOSE(ModifyFixMap, Modify, FixStyles*, fix_map)
 SOLIDCULL_EXPOSE(HistoryNewton, FixContactHistory, int*, newtonflag_)
-SOLIDCULL_EXPOSE(ExcludeCount, Neighbor, int, nex_group)
-SOLIDCULL_EXPOSE(ExcludeFirst, Neighbor, int*, ex1_group)
-SOLIDCULL_EXPOSE(ExcludeSecond, Neighbor, int*, ex2_group)
 SOLIDCULL_EXPOSE(InsertCompress, FixInsert, bool, compress_flag)
 SOLIDCULL_EXPOSE(PackRegion, FixInsertPack, LAMMPS_NS::Region*, ins_region)
 SOLIDCULL_EXPOSE(ThermoAtoms, Thermo, LAMMPS_NS::bigint, last_natoms)
@@ -38,27 +34,6 @@ SOLIDCULL_EXPOSE(ThermoAtoms, Thermo, LAMMPS_NS::bigint, last_natoms)
 std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify) { return *(modify.*member(ModifyFixMap())); }
 
 const int* history_newton_flags(const LAMMPS_NS::FixContactHistory& fix) { return fix.*member(HistoryNewton()); }
-
-bool excludes_group(const LAMMPS_NS::Neighbor& neighbor, int group) {
-  const int* first = neighbor.*member(ExcludeFirst());
-  const int* second = neighbor.*member(ExcludeSecond());
-  for (int k = 0; k < neighbor.*member(ExcludeCount()); ++k)
-    if (first[k] == group && second[k] == group) return true;
-  return false;
-}
-
-void include_group_again(LAMMPS_NS::Neighbor& neighbor, int group) {
-  int& count = neighbor.*member(ExcludeCount());
-  int* first = neighbor.*member(ExcludeFirst());
-  int* second = neighbor.*member(ExcludeSecond());
-  int kept = 0;
-  for (int k = 0; k < count; ++k) {
-    if (first[k] == group && second[k] == group) continue;
-    first[kept] = first[k];
-    second[kept++] = second[k];
-  }
-  count = kept;
-}
 
 bool compresses_tags(const LAMMPS_NS::FixInsert& fix) { return fix.*member(InsertCompress()); }
 

@@ -10,7 +10,6 @@ class FixContactHistory;
 class FixInsert;
 class LAMMPS;
 class Modify;
-class Neighbor;
 class Region;
 class Thermo;
 }  // namespace LAMMPS_NS
@@ -24,11 +23,6 @@ std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify);
 
 /// Per history number: 1 if it changes sign with the side it is seen from.
 const int* history_newton_flags(const LAMMPS_NS::FixContactHistory& fix);
-
-/// Whether pairs within the group are excluded from neighbour lists already.
-bool excludes_group(const LAMMPS_NS::Neighbor& neighbor, int group);
-/// Takes `neigh_modify exclude group G G` back, leaving the user's own exclusions as they are.
-void include_group_again(LAMMPS_NS::Neighbor& neighbor, int group);
 
 /// Whether the fix renumbers all granules when it inserts (compress_tags).
 bool compresses_tags(const LAMMPS_NS::FixInsert& fix);

@@ -44,6 +44,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void pre_initial_integrate() override;
   void pre_exchange() override;
   void pre_neighbor() override;
+  void setup_pre_force(int) override;
+  void pre_force(int) override;
   void pre_final_integrate() override;
   void end_of_step() override;
   void post_run() override;
@@ -69,10 +71,12 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
 
  private:
   // --- fix_solid_cull.cpp: the hooks, refusals, scales --------------------------------------------------------------------
-  void refuse(const std::string& why);
+  void refuse(const std::string& why);       // the user's fault; collective
+  void broken(const std::string& what);      // ours; local
   void refuse_what_cannot_be_culled();
   void find_scales();
   Vec3 gravity() const;
+  void leave_locked_pairs_out();
   void take_loads();
   void rebase_thawed_contacts();
   void ask_for_reneighbouring_if_waking();
@@ -198,6 +202,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
 
   std::vector<int> locked_index_;   // atom indices of interface granules since the last reneighbouring
   bool locked_index_stale_ = true;
+  bool lists_are_new_ = false;
   bool thawed_ = false;
   bool after_setup_ = false;
   bool walls_may_have_changed_ = false;

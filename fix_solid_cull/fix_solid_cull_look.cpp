@@ -23,9 +23,9 @@ constexpr double cover_slack = 0.5;
 constexpr double drawn_share = 0.25;
 // a wall closer than this share of a granule's radius closes the implicit surface behind itself
 constexpr double wall_closes = 0.2;
-// culling costs a rebuild of the neighbour lists (about three steps): it waits until it takes this share of the exterior
+// culling costs a rebuild of the neighbour lists: it waits for one that comes anyway, until it takes this share of the exterior
 // granules, or until a granule has waited for that many looks
-constexpr double worth_share = 0.01;
+constexpr double worth_share = 0.05;
 constexpr int longest_wait = 10;
 // where looks find nothing, they come up to this many times more seldom
 constexpr int largest_look_factor = 16;
@@ -60,12 +60,10 @@ void FixSolidCull::look() {
   for (int i = 0; i < atom->nlocal; ++i) counts[1] += !shell_[i].locked;
   for (const std::int64_t tag : chosen_) counts[2] += overdue_.contains(tag);
   MPI_Allreduce(MPI_IN_PLACE, counts, 3, MPI_INT64_T, MPI_SUM, world);
-  if (counts[0] > 0 && (counts[0] >= worth_share * static_cast<double>(counts[1]) || counts[2] > 0)) {
+  if (counts[0] > 0) {
     prepare_locking();
     if (!any_locked) gravity_at_locking_ = gravity();
-    next_reneighbor = update->ntimestep + 1;
-  } else {
-    chosen_.clear();
+    if (counts[0] >= worth_share * static_cast<double>(counts[1]) || counts[2] > 0) next_reneighbor = update->ntimestep + 1;
   }
   schedule_next_look(counts[0], counts[1]);
 }
@@ -234,12 +232,12 @@ void FixSolidCull::prepare_locking() {
       if (distance > radii * (1 + SolidStateLaw::gap)) continue;
       const bool first = will_be_locked(i), second = will_be_locked(j);
       if (first && second) touches_.push_back({atom->tag[i], atom->tag[j]});
-      const bool side_change = first && second && ((shell_[i].locked) != (j < owned ? shell_[j].locked : (atom->mask[j] & interface_bit) != 0));
+      // between owned granules the force is taken in the very state that is frozen; across ranks it is taken now
+      const bool side_change = first && second && j >= owned && shell_[i].locked && !(atom->mask[j] & interface_bit);
       const bool counts = loads && ((chosen.contains(atom->tag[i])) || (j < owned && chosen.contains(atom->tag[j])));
       if ((!side_change && !counts) || distance > radii * neighbor->contactDistanceFactor) continue;
       const Vec3 f = pair_force_.on_first(i, k);
-      if (side_change && shell_[i].locked) side_changes_.push_back({atom->tag[i], atom->tag[j], f});
-      if (side_change && j < owned && shell_[j].locked) side_changes_.push_back({atom->tag[j], atom->tag[i], -f});
+      if (side_change) side_changes_.push_back({atom->tag[i], atom->tag[j], f});
       if (!counts) continue;
       const double n = std::abs(f.dot(vec(atom->x[i]) - vec(atom->x[j]))) / distance;
       normal[i] += n;

@@ -87,7 +87,7 @@ void FixSolidCull::change_membership() {
     index_of_.clear();
     for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
     free_what_wakes(all);
-    lock_what_was_chosen();
+    if (!all) lock_what_was_chosen();
     tell_neighbours();
   }
   keep_shell_closed();
@@ -223,8 +223,10 @@ void FixSolidCull::free_what_wakes(bool all) {
 void FixSolidCull::lock_what_was_chosen() {
   for (const std::int64_t tag : chosen_) {
     const int* i = index_of_.find(tag);
-    // it may have left this rank or the simulation since the look, or something wakes beside it
-    if (!i || shell_[*i].locked || in_ball(vec(atom->x[*i]), diameter_)) continue;
+    // since the look it may have left this rank or the simulation, or have been moved, or something wakes beside it
+    if (!i || shell_[*i].locked || in_ball(vec(atom->x[*i]), diameter_) ||
+        !solid_state_.at_rest(vec(atom->v[*i]), vec(atom->omega[*i]), atom->radius[*i]))
+      continue;
     lock(*i);
     locked_now_.push_back(tag);
     locked_anywhere_[tag] = 1;
@@ -296,21 +298,32 @@ void FixSolidCull::keep_shell_closed() {
 }
 
 void FixSolidCull::freeze_contacts() {
-  // an engine contact between two granules that are locked now is out of the neighbour lists from here on
+  // contact between two granules that are locked now is left out of the engine's lists from here on
   const auto is_locked = [&](std::int64_t tag) {
     if (const int* i = index_of_.find(tag)) return shell_[*i].locked;
     return locked_anywhere_.contains(tag) || (ghost_interface_.contains(tag) && !freed_anywhere_.contains(tag));
+  };
+  // the load of a contact that goes inside stays in the balance that the older granule was locked with (invariant I5)
+  const auto rebase = [&](int i, std::int64_t partner, const double* history) {
+    if (shell_[i].fresh) return;
+    if (const int* j = index_of_.find(partner)) shell_[i].reference -= pair_force_.on_first(i, *j, history);
   };
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!shell_[i].locked) continue;
     const std::int64_t tag = atom->tag[i];
     histories_.for_each_partner(i, [&](int partner, const double* history) {
-      if (is_locked(partner)) contacts_.add(tag, partner, contacts_.width() ? history : nullptr);
+      if (!is_locked(partner)) return;
+      if (!contacts_.contains(tag, partner)) contacts_.add(tag, partner, contacts_.width() ? history : nullptr);
+      rebase(i, partner, history);
     });
   }
   for (const Touch& t : touches_)
-    if (is_locked(t.a) && is_locked(t.b) && !contacts_.contains(t.a, t.b)) contacts_.add(t.a, t.b, nullptr);
-  // the load of a contact that went inside stays in the balance that the granule was locked with (invariant I5)
+    if (is_locked(t.a) && is_locked(t.b) && !contacts_.contains(t.a, t.b)) {
+      contacts_.add(t.a, t.b, nullptr);
+      if (contacts_.width()) continue;  // touching within the gap: no force
+      if (const int* a = index_of_.find(t.a)) rebase(*a, t.b, nullptr);
+      if (const int* b = index_of_.find(t.b)) rebase(*b, t.a, nullptr);
+    }
   for (const SideChange& c : side_changes_) {
     const int* i = index_of_.find(c.interface_tag);
     if (i && shell_[*i].locked && !shell_[*i].fresh && is_locked(c.other_tag)) shell_[*i].reference -= c.force;
@@ -420,7 +433,8 @@ void FixSolidCull::restore_all() {
   histories_.bring_up_to_date();
   wake_all_ = true;
   change_membership();
-  gravity_at_locking_ = Vec3::Zero();
+  if (store_->size() != 0 || bodies_.locked() != 0 || contacts_.size() != 0)
+    broken("a restore of everything left " + std::to_string(store_->size()) + " granules in the store");
 }
 
 void FixSolidCull::open_for_insertion() {

@@ -1,0 +1,147 @@
+"""Cut-away pictures of a bed and its interface mesh, from the .vtp files that `fix solid/cull` writes."""
+import base64
+import xml.etree.ElementTree as xml
+from pathlib import Path
+
+import numpy as np
+
+# the paper's colours, by the value of the point array `state`
+STATES = {0: ("exterior", (0.85, 0.73, 0.55)), 1: ("interface", (0.25, 0.45, 0.80)), 2: ("interior", (0.33, 0.62, 0.33)),
+          3: ("waking", (0.95, 0.55, 0.10))}
+MESH = (0.62, 0.62, 0.62)
+STRIKER = (0.30, 0.30, 0.33)
+LIGHT = np.array([-0.35, -0.6, 0.72])  # towards the light, in (right, to the eye negative, up) of the picture
+VTK_TYPES = {"Float32": "<f4", "Float64": "<f8", "Int8": "<i1", "UInt8": "<u1", "Int32": "<i4", "UInt32": "<u4", "Int64": "<i8", "UInt64": "<u8"}
+
+
+def read_vtp(file):
+    """A VTK PolyData file (inline base64, UInt64 headers, uncompressed): {"points", "polys" (triangles), every array by name}."""
+    root = xml.parse(file).getroot()
+    if root.get("type") != "PolyData" or root.get("header_type") != "UInt64" or root.get("compressor"):
+        raise ValueError(f"{file}: not an uncompressed PolyData file with UInt64 headers")
+    piece = root.find("PolyData/Piece")
+    arrays = {}
+    for part in ("Points", "PointData", "CellData", "Polys"):
+        for a in piece.findall(f"{part}/DataArray"):
+            name = {"Points": "points"}.get(part, a.get("Name"))
+            text = "".join((a.text or "").split())
+            if "=" in text[:12]:  # the length stands in a base64 block of its own
+                data = base64.b64decode(text[12:])
+            else:
+                data = base64.b64decode(text)[8:]
+            values = np.frombuffer(data, VTK_TYPES[a.get("type")])
+            width = int(a.get("NumberOfComponents") or 1)
+            arrays[name] = values.reshape(-1, width) if width > 1 else values
+    arrays["points"] = arrays["points"].reshape(-1, 3).astype(float)
+    if "connectivity" in arrays:
+        arrays["polys"] = arrays.pop("connectivity").reshape(-1, 3)
+        arrays.pop("offsets", None)
+    return arrays
+
+
+class Picture:
+    """A parallel projection with a depth buffer: from the front, `turn` degrees to the side, `tilt` from above."""
+
+    def __init__(self, low, high, pixels=700, turn=18, tilt=22):
+        a, b = np.radians([turn, tilt])
+        self.right = np.array([np.cos(a), np.sin(a), 0])
+        self.up = np.array([-np.sin(a) * np.sin(b), np.cos(a) * np.sin(b), np.cos(b)])
+        self.away = np.cross(self.up, self.right)
+        corners = np.array(np.meshgrid(*zip(low, high))).reshape(3, -1).T
+        u, v = corners @ self.right, corners @ self.up
+        self.origin, self.scale = (u.min(), v.max()), pixels / (u.max() - u.min())
+        shape = int(np.ceil((v.max() - v.min()) * self.scale)), pixels
+        self.depth, self.image = np.full(shape, np.inf), np.ones(shape + (3,))
+
+    def project(self, points):
+        return np.column_stack([(points @ self.right - self.origin[0]) * self.scale,
+                                (self.origin[1] - points @ self.up) * self.scale, points @ self.away * self.scale])
+
+    def window(self, low, high):
+        """Pixel ranges and pixel centres of a box, clipped to the picture."""
+        h, w = self.depth.shape
+        x0, x1 = max(int(low[0]), 0), min(int(high[0]) + 1, w)
+        y0, y1 = max(int(low[1]), 0), min(int(high[1]) + 1, h)
+        return (slice(y0, y1), slice(x0, x1)), np.arange(x0, x1) + 0.5, np.arange(y0, y1)[:, None] + 0.5
+
+    def put(self, box, mask, depth, shade, colour):
+        near = mask & (depth < self.depth[box])
+        self.depth[box][near] = np.broadcast_to(depth, near.shape)[near]
+        self.image[box][near] = np.broadcast_to(shade, near.shape)[near][:, None] * np.asarray(colour)
+
+    def spheres(self, centres, radii, colours):
+        for (u, v, d), r, colour in zip(self.project(centres), radii * self.scale, colours):
+            box, x, y = self.window((u - r, v - r), (u + r, v + r))
+            nx, nz = (x - u) / r, (v - y) / r
+            left = 1 - nx**2 - nz**2
+            ny = -np.sqrt(np.maximum(left, 0))
+            shade = 0.45 + 0.55 * np.maximum(nx * LIGHT[0] + ny * LIGHT[1] + nz * LIGHT[2], 0)
+            self.put(box, left > 0, d + r * ny, shade, colour)
+
+    def triangles(self, points, polys, colour):
+        corners = self.project(points)[polys]
+        for (a, b, c) in corners:
+            (p, q) = (b - a), (c - a)
+            twice = p[0] * q[1] - p[1] * q[0]
+            if abs(twice) < 1e-12:
+                continue
+            box, x, y = self.window(np.minimum(np.minimum(a, b), c)[:2], np.maximum(np.maximum(a, b), c)[:2])
+            s = ((x - a[0]) * q[1] - (y - a[1]) * q[0]) / twice
+            t = ((y - a[1]) * p[0] - (x - a[0]) * p[1]) / twice
+            n = np.cross(p, q)
+            n /= np.linalg.norm(n)
+            shade = 0.45 + 0.55 * abs(n[0] * LIGHT[0] + n[2] * LIGHT[1] - n[1] * LIGHT[2])
+            self.put(box, (s >= 0) & (t >= 0) & (s + t <= 1), a[2] + s * p[2] + t * q[2], shade, colour)
+
+
+def cut_away(bed, mesh, cut, low, high, pixels=700, striker_radius=np.inf):
+    """Two images of one moment, the half with y < cut taken away: the granules by state, and the mesh with what is waking or
+    larger than `striker_radius`."""
+    x, r, state = bed["points"], bed["radius"].astype(float), bed["state"]
+    big = r > striker_radius
+    colours = np.array([STATES[int(s)][1] for s in state])
+    colours[big] = STRIKER
+    shown = big | (x[:, 1] >= cut)
+    granules = Picture(low, high, pixels)
+    granules.spheres(x[shown], r[shown], colours[shown])
+    surface = Picture(low, high, pixels)
+    shown &= big | (state == 3)
+    surface.spheres(x[shown], r[shown], colours[shown])
+    if mesh is not None and len(mesh.get("polys", ())):
+        polys = mesh["polys"]
+        surface.triangles(mesh["points"], polys[mesh["points"][polys][:, :, 1].mean(axis=1) >= cut], MESH)
+    return granules.image, surface.image
+
+
+def file_at(pattern, step):
+    """The file of a `*` pattern for a step, or None."""
+    file = Path(str(pattern).replace("*", str(step)))
+    return file if file.exists() else None
+
+
+def steps_of(pattern):
+    """The steps for which files of a `*` pattern exist."""
+    pattern = Path(pattern)
+    before, after = pattern.name.split("*")
+    names = (f.name[len(before):len(f.name) - len(after)] for f in pattern.parent.glob(pattern.name))
+    return sorted(int(n) for n in names if n.isdigit())
+
+
+def film_strip(moments, file, pixels=700):
+    """Writes one picture: a column for each of `moments` (title, granules image, mesh image)."""
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    from matplotlib.patches import Patch
+    fig, axes = plt.subplots(2, len(moments), squeeze=False, figsize=(3.2 * len(moments), 6.2))
+    for (top, bottom), (title, granules, mesh) in zip(axes.T, moments):
+        top.imshow(granules)
+        bottom.imshow(mesh)
+        top.set_title(title)
+    for ax in axes.flat:
+        ax.axis("off")
+    keys = [Patch(color=c, label=n) for n, c in STATES.values()] + [Patch(color=MESH, label="interface mesh")]
+    fig.legend(handles=keys, loc="lower center", ncol=len(keys), frameon=False)
+    fig.tight_layout(rect=(0, 0.05, 1, 1))
+    fig.savefig(file, dpi=110)
+    plt.close(fig)

@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# Runs an example, culled and unculled, and prints the comparison: examples/run.sh [NAME], default impact.
+# Installs what is missing and builds first. What it leaves: examples/NAME/out/.
+set -euo pipefail
+here=$(cd "$(dirname "$0")" && pwd)
+name=${1:-impact}
+if [ ! -f "$here/$name/example.py" ]; then
+  echo "run.sh: no example '$name'; there is: $(cd "$here" && ls -d */ | tr -d / | tr '\n' ' ')" >&2
+  exit 2
+fi
+"$here/../scripts/prepare.sh"
+exec /usr/bin/python3 "$here/$name/example.py"

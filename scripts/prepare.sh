@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# Makes build/ ready: installs what Debian 12 lacks (root, or a user with sudo), configures, builds.
+#   scripts/prepare.sh [TARGET...]      default: everything
+# What it ran quietly is in build/prepare.log. SOLIDCULL_JOBS sets the number of compilers at once.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+build=$root/build
+log=$build/prepare.log
+packages=(cmake make g++ liggghts libliggghts-dev libopenmpi-dev openmpi-bin libopenvdb-dev libtbb-dev libboost-dev
+          libeigen3-dev libgtest-dev zlib1g-dev python3 python3-numpy python3-matplotlib)
+gib_per_job=2  # a file that includes OpenVDB takes about 1.5
+
+fail() { [ -s "$log" ] && tail -n 15 "$log" >&2; echo "prepare: $1" >&2; exit 1; }
+
+mkdir -p "$build" || { echo "prepare: cannot write to $root; check its owner" >&2; exit 1; }
+: >"$log"
+
+if command -v dpkg-query >/dev/null; then
+  missing=()
+  for p in "${packages[@]}"; do
+    dpkg-query -W -f='${Status}' "$p" 2>/dev/null | grep -q 'ok installed' || missing+=("$p")
+  done
+  if [ ${#missing[@]} -gt 0 ]; then
+    sudo=
+    if [ "$(id -u)" != 0 ]; then
+      command -v sudo >/dev/null || fail "not root and no sudo: have root run 'apt-get install ${missing[*]}'"
+      sudo=sudo
+    fi
+    echo "prepare: installing ${missing[*]}"
+    apt=($sudo env DEBIAN_FRONTEND=noninteractive apt-get -q -o Acquire::Retries=3 -o DPkg::Lock::Timeout=300)
+    "${apt[@]}" update >>"$log" 2>&1 || fail "'apt-get update' failed; check the network and /etc/apt/sources.list"
+    "${apt[@]}" install -y --no-install-recommends "${missing[@]}" >>"$log" 2>&1 ||
+      fail "'apt-get install ${missing[*]}' failed; this needs Debian 12 (bookworm) and its main section"
+  fi
+fi
+
+cores=$(nproc)
+free_gib=$(awk '/^MemAvailable/ {print int($2 / 1048576)}' /proc/meminfo)
+jobs=$((free_gib / gib_per_job))
+[ "$jobs" -gt "$cores" ] && jobs=$cores
+[ "$jobs" -lt 1 ] && jobs=1
+
+echo "prepare: building (${*:-everything})"
+cmake -S "$root" -B "$build" -DCMAKE_BUILD_TYPE=Release >>"$log" 2>&1 || fail "cmake could not configure; see above and $log"
+cmake --build "$build" -j "${SOLIDCULL_JOBS:-$jobs}" ${*:+--target "$@"} >>"$log" 2>&1 || fail "the build failed; see above and $log"
