@@ -1,5 +1,6 @@
 """Cut-away pictures of a bed and its interface mesh, from the .vtp files that `fix solid/cull` writes."""
 import base64
+import io
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import numpy as np
 # the paper's colours, by the value of the point array `state`
 STATES = {0: ("exterior", (0.85, 0.73, 0.55)), 1: ("interface", (0.25, 0.45, 0.80)), 2: ("interior", (0.33, 0.62, 0.33)),
           3: ("waking", (0.95, 0.55, 0.10))}
-MESH = (0.62, 0.62, 0.62)
+MESH = (0.72, 0.72, 0.72)
 STRIKER = (0.30, 0.30, 0.33)
 LIGHT = np.array([-0.35, -0.6, 0.72])  # towards the light, in (right, to the eye negative, up) of the picture
 VTK_TYPES = {"Float32": "<f4", "Float64": "<f8", "Int8": "<i1", "UInt8": "<u1", "Int32": "<i4", "UInt32": "<u4", "Int64": "<i8", "UInt64": "<u8"}
@@ -133,7 +134,8 @@ def film_strip(moments, file, pixels=700):
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
     from matplotlib.patches import Patch
-    fig, axes = plt.subplots(2, len(moments), squeeze=False, figsize=(3.2 * len(moments), 6.2))
+    from PIL import Image
+    fig, axes = plt.subplots(2, len(moments), squeeze=False, figsize=(3.2 * len(moments), 5.4))
     for (top, bottom), (title, granules, mesh) in zip(axes.T, moments):
         top.imshow(granules)
         bottom.imshow(mesh)
@@ -143,5 +145,7 @@ def film_strip(moments, file, pixels=700):
     keys = [Patch(color=c, label=n) for n, c in STATES.values()] + [Patch(color=MESH, label="interface mesh")]
     fig.legend(handles=keys, loc="lower center", ncol=len(keys), frameon=False)
     fig.tight_layout(rect=(0, 0.05, 1, 1))
-    fig.savefig(file, dpi=110)
+    full = io.BytesIO()
+    fig.savefig(full, dpi=110)
     plt.close(fig)
+    Image.open(full).convert("RGB").quantize(96).save(file, optimize=True)  # a third of the size

@@ -107,6 +107,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void free_what_wakes(bool all);
   void lock_what_was_chosen();
   void tell_neighbours();
+  void share_exterior();
   void keep_shell_closed();
   void freeze_contacts();
   void thaw_contacts();

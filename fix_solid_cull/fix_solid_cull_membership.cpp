@@ -90,7 +90,8 @@ void FixSolidCull::change_membership() {
     if (!all) lock_what_was_chosen();
     tell_neighbours();
   }
-  keep_shell_closed();
+  if (change || stored_everywhere_ > 0) share_exterior();
+  if (stored_everywhere_ > 0) keep_shell_closed();
   if (change) {
     for (const std::int64_t tag : freed_) bodies_.unlock(tag, mass_of(tag), contacts_);
     thaw_contacts();
@@ -249,29 +250,26 @@ void FixSolidCull::tell_neighbours() {
     (rows[r + 4] == 0 ? freed_anywhere_ : locked_anywhere_)[static_cast<std::int64_t>(rows[r + 3])] = 1;
 }
 
+void FixSolidCull::share_exterior() {
+  halo_exterior_.clear();
+  if (!halo_.needed()) return;
+  std::vector<double> rows;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (!shell_[i].locked) rows.insert(rows.end(), {atom->x[i][0], atom->x[i][1], atom->x[i][2], atom->radius[i]});
+  rows = halo_.exchange(rows, 4, contact_reach() + store_gap_in_skins * neighbor->skin);
+  for (std::size_t r = 0; r < rows.size(); r += 4) halo_exterior_.push_back({vec(&rows[r]), rows[r + 3]});
+}
+
 void FixSolidCull::keep_shell_closed() {
-  if (stored_everywhere_ == 0) return;
   const auto timed = watch_.time(Part::shell);
   const double gap = neighbor->skin;
   std::set<std::int64_t> near;
   const auto look_around = [&](const Sphere& s) {
     store_->for_each_near(s, gap, [&](const StoredGranule& g) { near.insert(g.tag); });
   };
-  std::vector<double> rows;
-  for (int i = 0; i < atom->nlocal; ++i) {
-    if (shell_[i].locked) continue;
-    const Sphere s = sphere(i);
-    look_around(s);
-    if (halo_.needed()) rows.insert(rows.end(), {s.centre[0], s.centre[1], s.centre[2], s.radius});
-  }
-  halo_exterior_.clear();
-  if (halo_.needed()) {
-    rows = halo_.exchange(rows, 4, contact_reach() + store_gap_in_skins * gap);
-    for (std::size_t r = 0; r < rows.size(); r += 4) {
-      halo_exterior_.push_back({vec(&rows[r]), rows[r + 3]});
-      look_around(halo_exterior_.back());
-    }
-  }
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (!shell_[i].locked) look_around(sphere(i));
+  for (const Sphere& s : halo_exterior_) look_around(s);
   // what may have moved since the last reneighbouring: moving meshes; at the start of a run any wall
   const std::vector<WallContacts::Box> boxes = new_run_ ? walls_.triangle_boxes() : walls_.moving_triangle_boxes();
   const Vec3 reach = Vec3::Constant(store_->largest_radius() + gap);
@@ -354,7 +352,6 @@ void FixSolidCull::store_what_is_deep() {
   std::vector<Sphere> exterior;
   for (int i = 0; i < atom->nlocal; ++i)
     if (!shell_[i].locked) exterior.push_back(sphere(i));
-  if (halo_.needed() && stored_everywhere_ == 0) return;  // the halo is exchanged from the next reneighbouring on
   exterior.insert(exterior.end(), halo_exterior_.begin(), halo_exterior_.end());
   SphereCells cells;
   cells.build(std::move(exterior), 2 * diameter_);

@@ -154,6 +154,20 @@ def make_deck(lines, fix_id, culled, shift_seed, base):
     return out + end_of_deck(f"{base}.final")
 
 
+def check_metrics(metrics, lines):
+    """Refuses, before hours of running, a metric that the unculled deck (its lines) will not print."""
+    for metric in metrics:
+        reducer_of(metric)
+    styles = [words_of(line)[1:] for line in lines if words_of(line)[:1] == ["thermo_style"]]
+    if not styles or any(s[:1] != ["custom"] for s in styles[:-1]) or any(words_of(line)[:1] == ["include"] for line in lines):
+        return
+    columns = list(dict.fromkeys(c for s in styles if s[:1] == ["custom"] for c in s[1:]))
+    bare = [re.sub(r"^[cfv]_", "", c) for c in columns] + [THERMO_WORDS.get(c) for c in columns]
+    for name in (m.split(":")[0] for m in metrics):
+        if name not in columns and name not in bare:
+            raise TwinError(f"{name} is not among the thermo columns of the deck without the fix: {', '.join(columns)}")
+
+
 def counts_line(fix_id, base):
     columns = " ".join(f"f_{fix_id}[{k}]" for k in range(1, len(COUNTS) + 1))
     return f'fix twin_counts all ave/time {SAMPLE_EVERY} 1 {SAMPLE_EVERY} {columns} file "{base}.counts"'
@@ -250,11 +264,15 @@ def series(tables, name):
     return np.array(steps), np.array(values)
 
 
-def metric_of(tables, metric):
-    name, _, how = metric.partition(":")
-    if (how or "end") not in REDUCERS:
+def reducer_of(metric):
+    how = metric.partition(":")[2] or "end"
+    if how not in REDUCERS:
         raise TwinError(f"metric {metric}: `{how}` is not one of {', '.join(REDUCERS)}")
-    return float(REDUCERS[how or "end"](series(tables, name)[1]))
+    return REDUCERS[how]
+
+
+def metric_of(tables, metric):
+    return float(reducer_of(metric)(series(tables, metric.split(":")[0])[1]))
 
 
 def environment():
@@ -328,6 +346,7 @@ def compare(deck, metrics=(), launcher=None, out=None, unculled=3, culled=1, var
     deck = Path(deck).resolve()
     lines = read_deck(deck)
     fix_id = cull_fix(lines, deck.name)
+    check_metrics(metrics, make_deck(lines, fix_id, False, None, "-"))
     launcher = find_launcher(launcher)
     out = Path(out).resolve() if out else deck.with_name(deck.name + ".twin")
     out.mkdir(parents=True, exist_ok=True)
@@ -424,7 +443,7 @@ def table(result):
     if "exterior" in c:
         lines.append(f"mean while culled   exterior {c['exterior']:,.0f}, interface {c['interface']:,.0f}, "
                      f"interior {c['interior']:,.0f}")
-    lines.append(f"loop time           unculled {times(u)}, culled {times(c)}: {result['speed_up']:.2f} times faster")
+    lines.append(f"loop time           unculled {times(u)}, culled {times(c)}: speed-up {result['speed_up']:.2f}")
     if "seconds" in c:
         share = percent(c["seconds"], c["loop_time"])
         lines.append(f"in the fix          {c['seconds']:.1f} s ({share} of the culled loop time); "

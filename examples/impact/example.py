@@ -11,7 +11,7 @@ import pictures  # noqa: E402
 import twin      # noqa: E402
 
 OUT = HERE / "out"
-BOX, DEPTH, STRIKER = 0.075, 0.070, 0.005  # m: width of the bed, height shown, larger radii are the ball
+BOX, DEPTH, STRIKER = 0.075, 0.062, 0.005  # m: width of the bed, height shown, larger radii are the ball
 TIME_STEP = 3e-5                           # s
 SHIFTS = (0, 2.6e-8, -2.6e-8)              # m: the ball's x in each run, 1e-5 granule diameters apart
 METRICS = ("v_depth", "v_depth:max", "v_force:max", "c_bedke:max", "c_bedke:mean", "v_floor:max", "v_floor", "c_path")
@@ -58,16 +58,16 @@ def plot(runs, file):
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
     fig, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(7, 6))
-    for kind, colour in (("unculled", "0.55"), ("culled", "tab:blue")):
+    for kind, colour, width in (("unculled", "0.75", 4), ("culled", "tab:blue", 1)):
         for k, run in enumerate(runs[kind]):
             step, height = run.series("c_ballz")
-            top.plot(step * TIME_STEP * 1e3, height * 1e3, color=colour, lw=1.2, label=None if k else f"{kind}, {len(runs[kind])} runs")
+            top.plot(step * TIME_STEP * 1e3, height * 1e3, color=colour, lw=width, label=None if k else f"{kind}, {len(runs[kind])} runs")
     top.set_ylabel("height of the ball's centre (mm)")
     top.legend()
     for run in runs["culled"]:
         if run.counts:
             bottom.plot(run.counts["step"] * TIME_STEP * 1e3, run.counts["exterior"], color=pictures.STATES[0][1], lw=1.2)
-    bottom.axhline(len(runs["unculled"][0].final), color="0.55", lw=1.2)
+    bottom.axhline(len(runs["unculled"][0].final), color="0.75", lw=4)
     bottom.set(xlabel="time (ms)", ylabel="exterior granules", ylim=(0, None))
     fig.tight_layout()
     fig.savefig(file, dpi=120)
@@ -80,7 +80,7 @@ def draw(count=4):
     if not steps:
         return False
     moments = []
-    for step in sorted({steps[round(k)] for k in np.geomspace(1, len(steps) - 1, count)} if len(steps) > 1 else steps):
+    for step in sorted({steps[round(k) - 1] for k in np.geomspace(1, len(steps), count)}):
         mesh = pictures.file_at(OUT / "mesh.*.vtp", step)
         images = pictures.cut_away(pictures.read_vtp(OUT / f"bed.{step}.vtp"), pictures.read_vtp(mesh) if mesh else None,
                                    BOX / 2, (0, 0, 0), (BOX, BOX, DEPTH), striker_radius=STRIKER)

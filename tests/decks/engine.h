@@ -1,0 +1,71 @@
+// LIGGGHTS as a test drives it: commands in, state by tag out. Works on any number of ranks; every function is collective.
+#pragma once
+
+#include <mpi.h>
+
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace LAMMPS_NS {
+class Fix;
+class LAMMPS;
+}
+
+namespace decks {
+
+using Vec = std::array<double, 3>;
+
+struct Granule {
+  Vec x, v, omega, f, torque;
+  double radius, mass;
+  int type, mask;
+};
+
+/// Everything a granule has, by tag; equal on all ranks.
+using State = std::map<int, Granule>;
+/// History of each contact (tag, partner) as `tag` sees it; mesh contacts have the negative triangle ID - 1 as partner.
+using Histories = std::map<std::pair<int, int>, std::vector<double>>;
+
+class Engine {
+ public:
+  Engine();
+  ~Engine();
+  Engine(const Engine&) = delete;
+
+  void run(const std::string& deck);  ///< lines of a deck
+  State state() const;
+  Histories histories();              ///< granule-granule and granule-mesh
+  double vector(const std::string& fix, int n);  ///< f_ID[n], n from 1; n = 0: f_ID
+  double variable(const std::string& name);      ///< an equal-style variable
+  int rank() const;
+  int ranks() const;
+  LAMMPS_NS::LAMMPS* lammps() { return lmp_; }
+
+ private:
+  LAMMPS_NS::LAMMPS* lmp_;
+};
+
+double largest_difference(const State& a, const State& b, Vec Granule::*what);
+double largest(const State& a, Vec Granule::*what);
+
+/// What a bed is made of.
+struct Bed {
+  std::string name;
+  std::string contact = "model hertz tangential history rolling_friction epsd2";
+  bool mesh_walls = false;
+  bool cohesion = false;
+  int granules = 1300;
+  double side = 0.026;    // m, square base
+  double dt = 3e-5;       // s
+  std::string extra;      // lines after the walls
+};
+
+std::string head(const Bed& bed);                         ///< up to the box
+std::string body(const Bed& bed);                         ///< material, walls, gravity
+std::string read_bed(const Bed& bed);                     ///< reads the settled bed (made once, see settled())
+/// Pours and settles the bed once for all tests of a process and returns the restart file's name. Collective.
+std::string settled(const Bed& bed);
+
+}  // namespace decks

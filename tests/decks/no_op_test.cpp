@@ -1,0 +1,94 @@
+// Invariant I3: cull, then restore with nothing having moved, is as if nothing had been done.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "engine.h"
+
+namespace decks {
+namespace {
+
+constexpr double diameter = 0.0026;
+
+class NoOp : public testing::TestWithParam<Bed> {};
+
+TEST_P(NoOp, ForcesHistoriesAndFuture) {
+  const Bed bed = GetParam();
+  const std::string deck = read_bed(bed);
+  const std::string looks = "run 100\nrun 0\n";  // the last look chooses, the next run's setup culls
+
+  Engine never;
+  never.run(deck + looks);
+  Engine culled;
+  culled.run(deck + "fix cull all solid/cull every 50 calm 2 depth 1.5\n" + looks);
+  const double interior = culled.vector("cull", 3), interface = culled.vector("cull", 2);
+  EXPECT_GT(interior, 0.1 * bed.granules) << "nothing was stored: the test shows nothing";
+  EXPECT_GT(interface, 0.05 * bed.granules);
+  EXPECT_EQ(static_cast<double>(culled.state().size()) + interior, never.state().size());
+  culled.run("unfix cull\n");
+
+  const State a = never.state(), b = culled.state();
+  ASSERT_EQ(a.size(), b.size());
+  for (const auto& g : a) {
+    ASSERT_TRUE(b.count(g.first)) << "granule " << g.first << " was lost";
+    EXPECT_EQ(g.second.type, b.at(g.first).type);
+    EXPECT_EQ(g.second.radius, b.at(g.first).radius);
+    EXPECT_EQ(g.second.mass, b.at(g.first).mass);
+  }
+  EXPECT_EQ(largest_difference(a, b, &Granule::x), 0.0);
+  EXPECT_EQ(largest_difference(a, b, &Granule::v), 0.0);
+  EXPECT_EQ(largest_difference(a, b, &Granule::omega), 0.0);
+
+  never.run("run 0\n");
+  culled.run("run 0\n");
+  const State fa = never.state(), fb = culled.state();
+  EXPECT_LE(largest_difference(fa, fb, &Granule::f), 1e-12 * largest(fa, &Granule::f));
+  EXPECT_LE(largest_difference(fa, fb, &Granule::torque), 1e-12 * std::max(largest(fa, &Granule::torque), 1e-30));
+
+  const Histories ha = never.histories(), hb = culled.histories();
+  EXPECT_EQ(ha.size(), hb.size());
+  double most = 0, scale = 0;
+  for (const auto& h : ha) {
+    const auto other = hb.find(h.first);
+    ASSERT_NE(other, hb.end()) << "the history of " << h.first.first << " with " << h.first.second << " was lost";
+    for (std::size_t d = 0; d < h.second.size(); ++d) {
+      most = std::max(most, std::abs(h.second[d] - other->second[d]));
+      scale = std::max(scale, std::abs(h.second[d]));
+    }
+  }
+  EXPECT_LE(most, 1e-12 * scale);
+
+  never.run("run 1000\n");
+  culled.run("run 1000\n");
+  const double drift = largest_difference(never.state(), culled.state(), &Granule::x);
+  EXPECT_LE(drift, 1e-9 * diameter);
+  if (never.rank() == 0)
+    std::printf("%s: %g interior, %g interface of %zu; dx/d after 1000 steps %.3g\n", bed.name.c_str(), interior, interface,
+                a.size(), drift / diameter);
+}
+
+Bed bed(const std::string& name, const std::string& contact, bool mesh = false, bool cohesion = false) {
+  Bed b;
+  b.name = name;
+  b.contact = contact;
+  b.mesh_walls = mesh;
+  b.cohesion = cohesion;
+  if (contact.find("hooke") != std::string::npos) b.dt = 1e-5;  // stiffer at low speed: 3e-5 s would shake the bed
+  return b;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Models, NoOp,
+    testing::Values(bed("hertz_history_epsd2", "model hertz tangential history rolling_friction epsd2"),
+                    bed("hertz_history_mesh", "model hertz tangential history", true),
+                    bed("hertz_plain", "model hertz tangential no_history"),
+                    bed("hertz_cdt", "model hertz tangential history rolling_friction cdt"),
+                    bed("hooke_history", "model hooke tangential history"),
+                    bed("hooke_history_epsd_mesh", "model hooke tangential history rolling_friction epsd", true),
+                    bed("hooke_plain_mesh", "model hooke tangential no_history", true),
+                    bed("hertz_sjkr", "model hertz tangential history cohesion sjkr", false, true),
+                    bed("hertz_sjkr_mesh", "model hertz tangential history cohesion sjkr rolling_friction epsd2", true, true)),
+    [](const testing::TestParamInfo<Bed>& info) { return info.param.name; });
+
+}  // namespace
+}  // namespace decks
