@@ -14,7 +14,6 @@
 #include <openvdb/tools/Composite.h>
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/LevelSetSphere.h>
-#include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/ParticlesToLevelSet.h>
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/SignedFloodFill.h>
@@ -86,41 +85,89 @@ FloatGrid::Ptr rasterise(const std::vector<Sphere>& spheres, double growth, doub
   return grid;
 }
 
-/// Moves the surface of a union of spheres that were grown by `closing` back by `closing`.
+/// Depth (m) of the voxels inside a union of spheres below the union's surface, down to `reach`; infinite where not known.
 ///
-/// Inside such a union the stored depth is that in the deepest sphere, not that below the union's surface, so it cannot be shifted
-/// as it is; and re-normalising the whole inside costs a sweep per fraction of a voxel. The distance to the union's surface is
-/// taken from its triangles instead, which touches only the band along the surface. The sign comes from the union itself, so inner
-/// cavities stay open and inner seams count for nothing.
+/// The value stored inside a union is the depth in the deepest sphere, which is less. But each voxel y in the void knows its exact
+/// distance F(y) to the union, so the ball of radius F(y) around it is void, and no x lies deeper than |x - y| - F(y). The least of
+/// these bounds is handed inwards from voxel to voxel, in the order of depth. It is off by a few hundredths of a voxel where the
+/// surface is smooth, and by a quarter of a voxel in the sharp grooves between two spheres.
+FloatTree depth_inside(const FloatGrid& grown, double voxel, double reach) {
+  using openvdb::Coord;
+  constexpr float site_layer = 2.0f;  // sites are void voxels this near to the surface, and start what is this near to them
+  constexpr int start = 2;            // (both in voxels)
+  constexpr double gain = 1e-3;       // voxels; a smaller one is not handed on
+  constexpr double front_width = 0.5; // voxels
+
+  struct Site {
+    Coord at;
+    double clear;  // F, in voxels
+  };
+  std::vector<Site> sites;
+  FloatTree depth(std::numeric_limits<float>::infinity());
+  openvdb::Int32Tree site_of(-1);
+  openvdb::tree::ValueAccessor<const FloatTree, /*IsSafe=*/false> union_at(grown.tree());
+  openvdb::tree::ValueAccessor<FloatTree, /*IsSafe=*/false> depth_at(depth);
+  openvdb::tree::ValueAccessor<openvdb::Int32Tree, /*IsSafe=*/false> site_at(site_of);
+
+  const double reach_voxels = reach / voxel;
+  std::vector<std::vector<Coord>> fronts(static_cast<std::size_t>(reach_voxels / front_width) + 1);
+  const auto offer = [&](const Coord& x, std::int32_t site) {
+    const openvdb::Vec3d to_site = (x - sites[site].at).asVec3d();
+    const double value = std::max(to_site.length() - sites[site].clear, 0.0);
+    if (value > reach_voxels || value * voxel > depth_at.getValue(x) - gain * voxel) return;
+    if (union_at.getValue(x) >= 0.0f) return;
+    depth_at.setValue(x, static_cast<float>(value * voxel));
+    site_at.setValue(x, site);
+    fronts[std::min(static_cast<std::size_t>(value / front_width), fronts.size() - 1)].push_back(x);
+  };
+  const auto offer_around = [&](const Coord& x, int width, std::int32_t site) {
+    for (int i = -width; i <= width; ++i)
+      for (int j = -width; j <= width; ++j)
+        for (int k = -width; k <= width; ++k) offer(x.offsetBy(i, j, k), site);
+  };
+
+  for (auto leaf = grown.tree().cbeginLeaf(); leaf; ++leaf)
+    for (auto value = leaf->cbeginValueOn(); value; ++value) {
+      const double clear = *value / voxel;
+      if (clear < 0.0 || clear >= site_layer) continue;
+      sites.push_back({value.getCoord(), clear});
+      offer_around(sites.back().at, start, static_cast<std::int32_t>(sites.size() - 1));
+    }
+  for (std::size_t n = 0; n < fronts.size(); ++n)
+    for (std::size_t m = 0; m < fronts[n].size(); ++m) {  // the front may grow meanwhile
+      const Coord x = fronts[n][m];
+      const double value = depth_at.getValue(x) / voxel;
+      if (value < n * front_width) continue;  // a better bound came, and was handed on with an earlier front
+      offer_around(x, 1, site_at.getValue(x));
+    }
+  return depth;
+}
+
+/// Moves the surface of a union of spheres that were grown by `closing` back by `closing`. Only the band along the surface is
+/// touched; re-normalising the whole inside would cost a sweep per fraction of a voxel. Cavities that are left stay open.
 FloatGrid::Ptr shrink(const FloatGrid& grown, double closing, double voxel) {
   using namespace openvdb;
-  std::vector<Vec3s> points;
-  std::vector<Vec3I> triangles;
-  std::vector<Vec4I> quads;
-  tools::volumeToMesh(grown, points, triangles, quads, 0.0);
+  const auto shrunk = new_level_set(voxel);
+  const float width = shrunk->background(), back = static_cast<float>(closing);
+  const auto tree = std::make_shared<FloatTree>(depth_inside(grown, voxel, closing + (band + 1.0) * voxel));
+  for (auto leaf = grown.tree().cbeginLeaf(); leaf; ++leaf) tree->touchLeaf(leaf->origin());
 
-  const auto reach = static_cast<float>(closing / voxel) + band + 1.0f;
-  const FloatGrid::Ptr shrunk =
-      tools::meshToUnsignedDistanceField<FloatGrid>(grown.transform(), points, triangles, quads, reach);
-  shrunk->setGridClass(GRID_LEVEL_SET);
-
-  const float width = static_cast<float>(voxel) * band, back = static_cast<float>(closing);
-  tree::LeafManager<FloatTree> leaves(shrunk->tree());
+  tree::LeafManager<FloatTree> leaves(*tree);
   leaves.foreach([&](FloatTree::LeafNodeType& leaf, std::size_t) {
     tree::ValueAccessor<const FloatTree, /*IsSafe=*/false> union_at(grown.tree());
     for (Index n = 0; n < FloatTree::LeafNodeType::SIZE; ++n) {
       const float from_union = union_at.getValue(leaf.offsetToGlobalCoord(n));
-      // Inside, `min` keeps each granule's own sphere whole where the triangles are coarser than it.
-      const bool outside = from_union >= 0.0f;
-      const float to_surface = leaf.isValueOn(n) ? leaf.getValue(n) : std::numeric_limits<float>::infinity();
-      const float value = outside ? from_union + back : std::min(back - to_surface, from_union + back);
+      // Inside, no granule's own sphere may suffer from what the depth is off by.
+      const float value = from_union >= 0.0f ? from_union + back
+                                             : std::min(back - leaf.getValue(n), from_union + back);
       if (std::abs(value) < width) leaf.setValueOn(n, value);
       else leaf.setValueOff(n, value < 0.0f ? -width : width);
     }
   });
-  shrunk->tree().root().setBackground(width, /*updateChildNodes=*/false);
-  tools::signedFloodFill(shrunk->tree());
-  tools::pruneLevelSet(shrunk->tree());
+  tree->root().setBackground(width, /*updateChildNodes=*/false);
+  tools::signedFloodFill(*tree);
+  tools::pruneLevelSet(*tree);
+  shrunk->setTree(tree);
   return shrunk;
 }
 
@@ -316,19 +363,23 @@ void InterfaceMesh::bounds(Vec3& lo, Vec3& hi) const {
   hi = box.hi;
 }
 
-/// From the triangles (divergence theorem), so that it is the volume of what the user sees and sums up exactly over seams inside.
+/// From the distances at the voxel centres. A voxel counts with its share on the inner side of a plane at that distance; the mix of
+/// two such ramps, one and two voxels wide, has no error of second order in voxel / radius of curvature. (The triangles have: they
+/// enclose 1 % less at a radius of ten voxels.)
 double InterfaceMesh::volume() const {
-  impl_->grid();
+  const FloatTree& tree = impl_->grid().constTree();
   if (impl_->enclosed) return *impl_->enclosed;
-  const TriangleMesh mesh = triangles();
-  double six_volumes = 0.0;
-  if (!mesh.vertices.empty()) {
-    const Vec3 near = mesh.vertices.front();  // a body far from the origin would lose digits
-    for (const auto& t : mesh.triangles)
-      six_volumes += (mesh.vertices[t[0]] - near).dot(
-          (mesh.vertices[t[1]] - near).cross(mesh.vertices[t[2]] - near));
+  const auto ramp = [](double voxels, double width) { return std::clamp(0.5 - voxels / width, 0.0, 1.0); };
+  double voxels_inside = 0.0;
+  for (auto value = tree.cbeginValueAll(); value; ++value) {
+    if (value.getLevel() > 0) {
+      if (*value < 0.0f) voxels_inside += static_cast<double>(value.getVoxelCount());
+    } else {
+      const double at = *value / impl_->voxel;
+      voxels_inside += (4.0 * ramp(at, 1.0) - ramp(at, 2.0)) / 3.0;
+    }
   }
-  impl_->enclosed = six_volumes / 6.0;
+  impl_->enclosed = voxels_inside * std::pow(impl_->voxel, 3);
   return *impl_->enclosed;
 }
 

@@ -264,7 +264,7 @@ TEST(ImplicitSurface, knows_where_it_was_touched) {
   EXPECT_FALSE(surface.touched_near(here, 1.0));
   surface.touch({here, 2 * voxel});
   EXPECT_TRUE(surface.touched_near(here, 0.0));
-  EXPECT_TRUE(surface.touched_near(here + Vec3(0, 0, 14 * voxel), 5 * voxel));
+  EXPECT_TRUE(surface.touched_near(here + Vec3(0, 0, 11 * voxel), 5 * voxel));
   EXPECT_FALSE(surface.touched_near(here + Vec3(0, 0, 40 * voxel), 5 * voxel));
   EXPECT_TRUE(surface.touched_near(here + Vec3(0, 0, 40 * voxel), 40 * voxel));
   surface.clear_touched();

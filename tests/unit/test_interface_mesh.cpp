@@ -100,8 +100,7 @@ TEST(InterfaceMesh, of_one_ball_is_that_ball) {
   const Sphere ball{Vec3(0.0123, -0.0271, 0.0048), 10.3 * voxel};
   InterfaceMesh mesh(voxel, 0.0);
   mesh.add({ball});
-  // Chords and corner averages of a surface of radius R lie (h/R)^2 / 4 inside of it or less.
-  EXPECT_NEAR(mesh.volume(), ball_volume(ball.radius), 0.01 * ball_volume(ball.radius));
+  EXPECT_NEAR(mesh.volume(), ball_volume(ball.radius), 1e-3 * ball_volume(ball.radius));
   EXPECT_TRUE(mesh.inside(ball.centre));
 
   Vec3 lo, hi;
@@ -130,7 +129,7 @@ TEST(InterfaceMesh, closing_gives_a_ball_back) {
   for (const double closing : {0.4 * voxel, 1.0 * voxel, 2.7 * voxel, 8.0 * voxel}) {
     InterfaceMesh mesh(voxel, closing);
     mesh.add({ball});
-    EXPECT_NEAR(mesh.volume(), ball_volume(ball.radius), 0.03 * ball_volume(ball.radius)) << closing;
+    EXPECT_NEAR(mesh.volume(), ball_volume(ball.radius), 0.01 * ball_volume(ball.radius)) << closing;
     const Vec3 out = Vec3(1, 2, -0.5).normalized();
     for (const double offset : {-2.0, -1.0, 0.0, 1.0, 2.0})
       EXPECT_NEAR(mesh.signed_distance(ball.centre + (ball.radius + offset * voxel) * out), offset * voxel, 0.15 * voxel)
@@ -146,7 +145,7 @@ TEST(InterfaceMesh, a_carve_takes_the_lens_away) {
   const Sphere carve{body.centre + Vec3(10.2, 3.3, -2.1) * voxel, 8.5 * voxel};
   mesh.carve(carve);
   const double lens = lens_volume(body.radius, carve.radius, (carve.centre - body.centre).norm());
-  EXPECT_NEAR(before - mesh.volume(), lens, 0.03 * lens);
+  EXPECT_NEAR(before - mesh.volume(), lens, 0.01 * lens);
   EXPECT_FALSE(mesh.inside(carve.centre));
 }
 
@@ -155,7 +154,7 @@ TEST(InterfaceMesh, a_carve_within_leaves_a_cavity_of_its_own_size) {
   mesh.add({{Vec3::Zero(), 16.0 * voxel}});
   const double before = mesh.volume();
   mesh.carve({Vec3(1, 2, 3) * voxel, 7.0 * voxel});
-  EXPECT_NEAR(before - mesh.volume(), ball_volume(7.0 * voxel), 0.02 * ball_volume(7.0 * voxel));
+  EXPECT_NEAR(before - mesh.volume(), ball_volume(7.0 * voxel), 5e-3 * ball_volume(7.0 * voxel));
   EXPECT_EQ(topology_of(mesh.triangles()).components, 2);
 }
 
@@ -189,7 +188,9 @@ TEST(InterfaceMesh, carves_equal_their_union_whatever_their_order) {
       double expected = p.norm() - body.radius;
       for (const Sphere& c : carves) expected = std::max(expected, c.radius - (p - c.centre).norm());
       // Trilinear interpolation rounds the edges where carves meet, by less than half a voxel's diagonal.
-      if (std::abs(expected) > 0.87 * voxel) EXPECT_EQ(forward.inside(p), expected < 0) << p.transpose();
+      if (std::abs(expected) > 0.87 * voxel) {
+        EXPECT_EQ(forward.inside(p), expected < 0) << p.transpose();
+      }
     });
   }
 }
@@ -340,8 +341,7 @@ TEST(InterfaceMesh, merged_bodies_are_their_union_and_leave_nothing_behind) {
   const double separate = a.volume() + b.volume();
   a.merge(std::move(b));
   EXPECT_TRUE(b.empty());
-  EXPECT_LE(a.volume(), separate);
-  EXPECT_GT(a.volume(), 0.9 * separate);
+  EXPECT_NEAR(a.volume(), separate, 0.03 * separate);  // they touch
   EXPECT_TRUE(a.inside(right[5].centre));
   b.add(right);  // an emptied mesh may be used again
   EXPECT_FALSE(b.empty());

@@ -1,0 +1,178 @@
+// What a user's deck must see: loads, ids, restarts, fines, ramps. Each culled run stands beside one that never culls.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+
+#include "engine.h"
+
+namespace decks {
+namespace {
+
+constexpr double diameter = 0.0026;
+
+Bed mesh_bed(const std::string& name) {
+  Bed bed;
+  bed.name = name;
+  bed.mesh_walls = true;
+  return bed;
+}
+
+void write_plate(const std::string& file, double side, double z) {
+  std::ofstream out(file);
+  const double lo = 1e-4, hi = side - 1e-4;
+  const double c[4][2] = {{lo, lo}, {hi, lo}, {hi, hi}, {lo, hi}};
+  out << "solid plate\n";
+  for (const auto& t : {std::array<int, 3>{0, 2, 1}, std::array<int, 3>{0, 3, 2}}) {
+    out << "facet normal 0 0 -1\nouter loop\n";
+    for (const int k : t) out << "vertex " << c[k][0] << ' ' << c[k][1] << ' ' << z << "\n";
+    out << "endloop\nendfacet\n";
+  }
+  out << "endsolid plate\n";
+}
+
+double f(Engine& e, int n) { return e.vector("cull", n); }
+
+TEST(Scenes, WallLoadsOfABedAtRest) {
+  Engine e;
+  e.run(read_bed(mesh_bed("loads")) + "run 50\n");
+  const double floor = e.vector("floor", 3), side = e.vector("side", 1), friction = e.vector("side", 3);
+  e.run("fix cull all solid/cull every 50 calm 2 depth 1.5\nrun 1000\n");
+  ASSERT_GT(f(e, 3), 100);
+  EXPECT_NEAR(e.vector("floor", 3), floor, 1e-3 * std::abs(floor));
+  EXPECT_NEAR(e.vector("side", 1), side, 1e-3 * std::abs(side));
+  EXPECT_NEAR(e.vector("side", 3), friction, 1e-3 * std::abs(side));
+  if (e.rank() == 0)
+    std::printf("floor %.8g -> %.8g N, side %.8g -> %.8g N\n", floor, e.vector("floor", 3), side, e.vector("side", 1));
+}
+
+TEST(Scenes, RestartWhileCulledGoesOnAsIfItHadNotStopped) {
+  const Bed bed = mesh_bed("restart");
+  const std::string fix = "fix cull all solid/cull every 50 calm 2 depth 1.5\n";
+  // something that moves: granules rain onto the culled bed
+  const std::string rain =
+      "create_atoms 1 single 0.013 0.013 0.06\ncreate_atoms 1 single 0.017 0.013 0.065\n"
+      "group rain id > 1300\nset group rain diameter 0.0026\nset group rain density 2500\nvelocity rain set 0 0 -0.5\n";
+  Engine straight;
+  straight.run(read_bed(bed) + "run 0\n" + rain + fix + "run 600\nwrite_restart stop.restart\nrun 1000\n");
+  Engine again;
+  again.run(head(bed) + "read_restart stop.restart\nneighbor 0.0004 bin\nneigh_modify delay 0\n" + body(bed) +
+            "fix integr all nve/sphere\nthermo 100000\nthermo_modify norm no\n" + fix + "run 0\n");
+  EXPECT_GT(f(again, 3), 100);
+  again.run("run 1000\n");
+  for (const int n : {1, 2, 3}) EXPECT_EQ(f(again, n), f(straight, n)) << "f_cull[" << n << "]";
+  EXPECT_EQ(f(again, 6), f(straight, 6)) << "culled so far";
+  EXPECT_NEAR(f(again, 5), f(straight, 5), 1e-12 * f(straight, 5)) << "stored mass";
+  straight.run("unfix cull\nrun 0\n");
+  again.run("unfix cull\nrun 0\n");
+  const State a = straight.state(), b = again.state();
+  EXPECT_EQ(a.size(), 1302u);
+  const double apart = largest_difference(a, b, &Granule::x);
+  EXPECT_LE(apart, 1e-9 * diameter);
+  if (straight.rank() == 0) std::printf("after 1000 steps: %.3g d apart\n", apart / diameter);
+}
+
+TEST(Scenes, FinesPouredOnACoarseBedNeverTouchAnInteriorGranule) {
+  Bed bed;
+  bed.name = "coarse";
+  bed.granules = 700;
+  Engine e;
+  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.0 tolerance 3 0\nrun 300\n");
+  const double before = f(e, 3);
+  ASSERT_GT(before, 30);
+  // 10:1: granules of 0.13 mm radius fall through the pores (type 2's material, stiff enough for 1e-6 s)
+  std::string pour = "lattice sc 0.0006\nregion fines block 0.009 0.017 0.009 0.017 0.040 0.046 units box\n"
+                     "create_atoms 2 region fines\ngroup fines id > 700\nset group fines diameter 0.00026\n"
+                     "set group fines density 2500\nvelocity fines set 0 0 -1.0\ntimestep 0.000003\n";
+  e.run(pour);
+  const std::size_t fines = e.state().size() + static_cast<std::size_t>(before) - 700;
+  ASSERT_GT(fines, 500u);
+  double lowest = 1;
+  for (int k = 0; k < 40; ++k) {
+    e.run("run 250\n");
+    EXPECT_EQ(f(e, 1) + f(e, 2) + f(e, 3), 700.0 + static_cast<double>(fines));
+    for (const auto& g : e.state())
+      if (g.first > 700) lowest = std::min(lowest, g.second.x[2]);
+  }
+  const double after = f(e, 3);
+  EXPECT_LT(after, before) << "no granule was fetched from the store: the fines never came near it";
+  e.run("unfix cull\nrun 0\n");
+  const State all = e.state();
+  EXPECT_EQ(all.size(), 700u + fines);
+  double deepest = 0;
+  for (const auto& a : all) {
+    if (a.first <= 700) continue;
+    for (const auto& b : all) {
+      if (b.first > 700) continue;
+      double d2 = 0;
+      for (int d = 0; d < 3; ++d) d2 += (a.second.x[d] - b.second.x[d]) * (a.second.x[d] - b.second.x[d]);
+      deepest = std::max(deepest, a.second.radius + b.second.radius - std::sqrt(d2));
+    }
+  }
+  EXPECT_LT(deepest, 0.1 * 0.00013) << "a fine granule is inside a coarse one";
+  if (e.rank() == 0)
+    std::printf("%zu fines, lowest at %.3g m, deepest overlap %.3g of their radius; interior %g -> %g\n", fines, lowest,
+                deepest / 0.00013, before, after);
+}
+
+/// A plate rests on a bed under load, the bed is culled, then the plate is driven down; returns the plate's load change (N) at
+/// the first load change that is over the tolerance.
+double load_change_at_wake_up(double plate_speed) {
+  Bed bed;
+  bed.name = "ramp";
+  bed.extra = "fix plate all mesh/surface/stress file plate.stl type 1\nfix platewall all wall/gran " + bed.contact +
+              " mesh n_meshes 1 meshes plate\n";
+  Bed bare;
+  bare.name = bed.name;
+  Engine e;
+  if (e.rank() == 0) write_plate("plate.stl", bed.side, 0);
+  e.run(read_bed(bare) + "run 0\nvariable top equal bound(all,zmax)+0.0013\nvariable z equal ${top}\n");
+  const double top = e.variable("z");
+  if (e.rank() == 0) write_plate("plate.stl", bed.side, top);
+  MPI_Barrier(MPI_COMM_WORLD);
+  e.run(bed.extra + "fix down all move/mesh mesh plate linear 0 0 -0.02\nfix visc all viscous 0.002\nrun 0\n");
+  while (e.vector("plate", 3) < 0.2) e.run("run 20 pre no post no\n");
+  e.run("unfix down\nrun 4000\nunfix visc\nrun 1000\nfix cull all solid/cull every 50 calm 2 depth 1.5 tolerance 1 0\nrun 1000\n");
+  EXPECT_GT(f(e, 3), 100);
+  EXPECT_EQ(f(e, 8), 0);
+  const double before = e.vector("plate", 3);
+  char move[100];
+  std::snprintf(move, sizeof move, "fix down all move/mesh mesh plate linear 0 0 -%g\nrun 0\n", plate_speed);
+  e.run(move);
+  const int chunk = std::max(1, static_cast<int>(1e-9 / plate_speed / bed.dt));  // a nanometre
+  double load = 0;  // what wakes moves, so the load is read before
+  for (int k = 0; k < 2000; ++k) {
+    e.run("run " + std::to_string(chunk) + " pre no post no\n");
+    if (f(e, 8) > 0 || f(e, 9) > 1) return load;
+    load = e.vector("plate", 3) - before;
+  }
+  ADD_FAILURE() << "nothing woke";
+  return 0;
+}
+
+TEST(Scenes, ASlowAndAFastRampWakeAtTheSameLoad) {
+  const double middle = load_change_at_wake_up(3e-7), slow = load_change_at_wake_up(3e-8), fast = load_change_at_wake_up(3e-6);
+  EXPECT_GT(middle, 0);
+  EXPECT_NEAR(slow, middle, 0.05 * middle);
+  EXPECT_NEAR(fast, middle, 0.05 * middle);
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  if (rank == 0) std::printf("first wake-up at +%.5g N (10 x slower: +%.5g N, 10 x faster: +%.5g N)\n", middle, slow, fast);
+}
+
+TEST(Scenes, GranulesLeaveByTheStoreAndComeBackWithTheirIds) {
+  const Bed bed = mesh_bed("ids");
+  Engine e;
+  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.5\nrun 500\n");
+  const State atoms = e.state();
+  EXPECT_TRUE(atoms.count(1300)) << "the highest tag must stay an atom: new atoms are numbered from it";
+  ASSERT_GT(f(e, 3), 100);
+  e.run("create_atoms 1 single 0.013 0.013 0.06\ngroup new id > 1300\nset group new diameter 0.0026\nset group new density 2500\n");
+  EXPECT_TRUE(e.state().count(1301));
+  e.run("unfix cull\nrun 0\n");
+  EXPECT_EQ(e.state().size(), 1301u);
+}
+
+}  // namespace
+}  // namespace decks

@@ -1,0 +1,124 @@
+#include "flat_map.h"
+
+#include <random>
+#include <string>
+#include <unordered_map>
+
+#include <gtest/gtest.h>
+
+namespace solidcull {
+namespace {
+
+using Reference = std::unordered_map<std::int64_t, int>;
+
+void expect_same(const FlatMap<int>& map, const Reference& reference) {
+  ASSERT_EQ(map.size(), reference.size());
+  ASSERT_EQ(map.empty(), reference.empty());
+  for (const auto& r : reference) {
+    const int* found = map.find(r.first);
+    ASSERT_NE(found, nullptr) << "key " << r.first << " is lost";
+    ASSERT_EQ(*found, r.second);
+  }
+  std::size_t visited = 0;
+  map.for_each([&](std::int64_t key, int value) {
+    ++visited;
+    ASSERT_TRUE(reference.count(key)) << "key " << key << " came from nowhere";
+    ASSERT_EQ(value, reference.at(key));
+  });
+  ASSERT_EQ(visited, reference.size());
+}
+
+/// `operations` random insertions and removals over `keys` keys, compared every so often.
+void random_operations(unsigned seed, std::int64_t keys, int operations, int compare_every) {
+  std::mt19937_64 random(seed);
+  FlatMap<int> map;
+  Reference reference;
+  for (int n = 0; n < operations; ++n) {
+    const std::int64_t key = static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(keys)) - keys / 2;
+    if (random() % 2) {
+      const int value = static_cast<int>(random() % 1000);
+      map[key] = value;
+      reference[key] = value;
+    } else {
+      ASSERT_EQ(map.erase(key), reference.erase(key) == 1);
+    }
+    ASSERT_EQ(map.contains(key), reference.count(key) == 1);
+    if (n % compare_every == 0) expect_same(map, reference);
+  }
+  expect_same(map, reference);
+}
+
+TEST(FlatMap, a_new_map_is_empty_and_finds_nothing) {
+  FlatMap<int> map;
+  EXPECT_EQ(map.size(), 0u);
+  EXPECT_TRUE(map.empty());
+  EXPECT_EQ(map.find(0), nullptr);
+  EXPECT_FALSE(map.erase(0));
+}
+
+TEST(FlatMap, a_new_key_has_the_default_value) {
+  FlatMap<double> map;
+  EXPECT_EQ(map[7], 0.0);
+  map[7] = 2.5;
+  EXPECT_EQ(map[7], 2.5);
+  EXPECT_EQ(map.size(), 1u);
+}
+
+TEST(FlatMap, a_key_that_was_erased_starts_from_the_default_again) {
+  FlatMap<int> map;
+  map[3] = 5;
+  EXPECT_TRUE(map.erase(3));
+  EXPECT_FALSE(map.erase(3));
+  EXPECT_EQ(map[3], 0);
+}
+
+TEST(FlatMap, takes_the_ends_of_the_key_range) {
+  FlatMap<int> map;
+  for (const std::int64_t key : {INT64_MIN + 1, std::int64_t{-1}, std::int64_t{0}, INT64_MAX}) map[key] = 1;
+  EXPECT_EQ(map.size(), 4u);
+  EXPECT_TRUE(map.contains(INT64_MIN + 1));
+  EXPECT_TRUE(map.contains(INT64_MAX));
+}
+
+// few keys in a small table: long runs of occupied slots, many of them around the table's end
+TEST(FlatMap, removal_shifts_back_what_was_displaced) {
+  for (unsigned seed = 0; seed < 300; ++seed) random_operations(seed, 9, 200, 1);
+  for (unsigned seed = 0; seed < 20; ++seed) random_operations(seed, 60, 2000, 7);
+}
+
+TEST(FlatMap, does_as_unordered_map_does_under_random_operations) {
+  random_operations(1, 3000, 200000, 20000);
+  random_operations(2, INT64_MAX, 20000, 2000);
+}
+
+TEST(FlatMap, removal_leaves_no_tombstones) {
+  FlatMap<int> map;
+  for (int k = 0; k < 100; ++k) map[k] = k;
+  const std::size_t bytes = map.memory_bytes();
+  for (int k = 100; k < 100000; ++k) {
+    map[k] = k;
+    map.erase(k - 100);
+  }
+  EXPECT_EQ(map.size(), 100u);
+  EXPECT_LE(map.memory_bytes(), bytes);
+}
+
+TEST(FlatMap, holds_values_that_own_memory) {
+  FlatMap<std::string> map;
+  for (int k = 0; k < 1000; ++k) map[k] = std::string(40, static_cast<char>('a' + k % 26));
+  for (int k = 0; k < 1000; k += 2) map.erase(k);
+  for (int k = 1; k < 1000; k += 2) EXPECT_EQ(*map.find(k), std::string(40, static_cast<char>('a' + k % 26)));
+}
+
+TEST(FlatMap, clear_gives_the_memory_back) {
+  FlatMap<int> map;
+  for (int k = 0; k < 1000; ++k) map[k] = k;
+  map.clear();
+  EXPECT_TRUE(map.empty());
+  EXPECT_EQ(map.find(1), nullptr);
+  map[1] = 2;
+  EXPECT_EQ(map.size(), 1u);
+}
+
+}  // namespace
+}  // namespace solidcull

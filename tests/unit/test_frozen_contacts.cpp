@@ -1,0 +1,195 @@
+#include "frozen_contacts.h"
+
+#include <map>
+#include <random>
+#include <set>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+namespace solidcull {
+namespace {
+
+using History = std::vector<double>;
+using Pair = std::pair<std::int64_t, std::int64_t>;
+
+/// Partner to history (empty: touching without history), as `tag` sees its contacts.
+std::map<std::int64_t, History> seen_by(const FrozenContacts& contacts, std::int64_t tag) {
+  std::map<std::int64_t, History> seen;
+  contacts.for_each(tag, [&](std::int64_t partner, const double* h) {
+    EXPECT_EQ(seen.count(partner), 0u) << "a contact is visited twice";
+    seen[partner] = h ? History(h, h + contacts.width()) : History();
+  });
+  std::set<std::int64_t> partners;
+  contacts.for_each_partner(tag, [&](std::int64_t partner) { partners.insert(partner); });
+  EXPECT_EQ(partners.size(), seen.size());
+  return seen;
+}
+
+FrozenContacts with_layout(std::vector<bool> flips) {
+  FrozenContacts contacts;
+  contacts.set_layout(std::move(flips));
+  return contacts;
+}
+
+TEST(FrozenContacts, a_history_is_seen_by_its_giver_as_it_was_given) {
+  const double h[] = {1, 2, 3, 4};
+  for (const bool low_gives : {true, false}) {
+    FrozenContacts contacts = with_layout({true, true, false, true});
+    const std::int64_t giver = low_gives ? 5 : 9, other = low_gives ? 9 : 5;
+    contacts.add(giver, other, h);
+    EXPECT_EQ(seen_by(contacts, giver)[other], (History{1, 2, 3, 4}));
+    EXPECT_EQ(seen_by(contacts, other)[giver], (History{-1, -2, 3, -4}));
+  }
+}
+
+TEST(FrozenContacts, turned_is_the_view_from_the_other_side_and_its_own_inverse) {
+  const FrozenContacts contacts = with_layout({true, false});
+  const double h[] = {3, 4};
+  const History other = contacts.turned(h);
+  EXPECT_EQ(other, (History{-3, 4}));
+  EXPECT_EQ(contacts.turned(other.data()), (History{3, 4}));
+}
+
+TEST(FrozenContacts, each_contact_is_listed_once_as_its_low_tag_sees_it) {
+  FrozenContacts contacts = with_layout({true});
+  const double h[] = {2};
+  contacts.add(8, 3, h);
+  contacts.add(3, 1, nullptr);
+  std::map<Pair, History> all;
+  contacts.for_each_contact([&](std::int64_t low, std::int64_t high, const double* history) {
+    all[{low, high}] = history ? History(history, history + 1) : History();
+  });
+  EXPECT_EQ(all, (std::map<Pair, History>{{{3, 8}, {-2}}, {{1, 3}, {}}}));
+}
+
+TEST(FrozenContacts, adding_again_from_either_side_replaces_the_history) {
+  FrozenContacts contacts = with_layout({true});
+  const double first[] = {1}, second[] = {5}, third[] = {7};
+  contacts.add(1, 2, first);
+  contacts.add(1, 2, second);
+  EXPECT_EQ(contacts.size(), 1u);
+  EXPECT_EQ(seen_by(contacts, 1)[2], (History{5}));
+  contacts.add(2, 1, third);
+  EXPECT_EQ(contacts.size(), 1u);
+  EXPECT_EQ(seen_by(contacts, 2)[1], (History{7}));
+  EXPECT_EQ(seen_by(contacts, 1)[2], (History{-7}));
+}
+
+TEST(FrozenContacts, a_history_may_come_and_go) {
+  FrozenContacts contacts = with_layout({false, false});
+  const double h[] = {1, 2};
+  contacts.add(1, 2, nullptr);
+  EXPECT_EQ(seen_by(contacts, 1)[2], History());
+  contacts.add(1, 2, h);
+  EXPECT_EQ(seen_by(contacts, 1)[2], (History{1, 2}));
+  contacts.add(1, 2, nullptr);
+  EXPECT_EQ(seen_by(contacts, 2)[1], History());
+}
+
+TEST(FrozenContacts, contact_models_without_history_have_a_graph_too) {
+  FrozenContacts contacts = with_layout({});
+  contacts.add(1, 2, nullptr);
+  contacts.add(2, 3, nullptr);
+  EXPECT_TRUE(contacts.contains(3, 2));
+  EXPECT_FALSE(contacts.contains(1, 3));
+  EXPECT_EQ(seen_by(contacts, 2).size(), 2u);
+}
+
+TEST(FrozenContacts, erase_takes_all_contacts_of_a_granule_from_both_sides) {
+  FrozenContacts contacts = with_layout({true});
+  const double h[] = {1};
+  for (std::int64_t a = 1; a <= 4; ++a)
+    for (std::int64_t b = a + 1; b <= 4; ++b) contacts.add(a, b, h);
+  contacts.erase(2);
+  EXPECT_EQ(contacts.size(), 3u);
+  EXPECT_TRUE(seen_by(contacts, 2).empty());
+  for (const std::int64_t tag : {1, 3, 4}) EXPECT_EQ(seen_by(contacts, tag).size(), 2u);
+  contacts.erase(2);
+  contacts.erase(99);
+  EXPECT_EQ(contacts.size(), 3u);
+}
+
+TEST(FrozenContacts, places_of_erased_contacts_are_used_again) {
+  FrozenContacts contacts = with_layout({true, false, true});
+  const double h[] = {1, 2, 3};
+  for (std::int64_t tag = 1; tag <= 100; ++tag) contacts.add(0, tag, h);
+  const std::size_t bytes = contacts.memory_bytes();
+  for (std::int64_t round = 1; round <= 50; ++round) {
+    contacts.erase(0);
+    EXPECT_EQ(contacts.size(), 0u);
+    for (std::int64_t tag = 1; tag <= 100; ++tag) contacts.add(0, 1000 * round + tag, round % 2 ? h : nullptr);
+  }
+  EXPECT_EQ(contacts.size(), 100u);
+  EXPECT_LE(contacts.memory_bytes(), 2 * bytes) << "the list of free places is all that may come on top";
+  // what stood in the place before is not seen
+  EXPECT_EQ(seen_by(contacts, 50001)[0], History());
+}
+
+TEST(FrozenContacts, the_layout_may_change_only_while_nothing_is_frozen) {
+  FrozenContacts contacts = with_layout({true});
+  const double h[] = {1};
+  contacts.add(1, 2, h);
+  EXPECT_NO_THROW(contacts.set_layout({true}));
+  EXPECT_THROW(contacts.set_layout({false}), std::logic_error);
+  EXPECT_THROW(contacts.set_layout({true, true}), std::logic_error);
+}
+
+TEST(FrozenContacts, a_new_layout_after_all_is_erased_keeps_later_histories_apart) {
+  FrozenContacts contacts = with_layout({true});
+  const double h[] = {1};
+  for (std::int64_t tag = 1; tag <= 5; ++tag) contacts.add(0, tag, h);
+  contacts.erase(0);
+  contacts.set_layout({false, true, false});
+  for (std::int64_t tag = 1; tag <= 8; ++tag) {
+    const double x = static_cast<double>(tag);
+    const double wide[] = {x, 10 * x, 100 * x};
+    contacts.add(0, tag, wide);
+  }
+  for (std::int64_t tag = 1; tag <= 8; ++tag) {
+    const double x = static_cast<double>(tag);
+    EXPECT_EQ(seen_by(contacts, 0)[tag], (History{x, 10 * x, 100 * x})) << "of " << tag;
+    EXPECT_EQ(seen_by(contacts, tag)[0], (History{x, -10 * x, 100 * x})) << "of " << tag;
+  }
+}
+
+TEST(FrozenContacts, does_as_a_map_of_pairs_does_under_random_operations) {
+  const std::vector<bool> flips{true, false, true};
+  std::mt19937 random(7);
+  std::normal_distribution<double> number;
+  FrozenContacts contacts = with_layout(flips);
+  std::map<Pair, History> reference;  // both directions
+  const auto turned = [&](History h) {
+    for (std::size_t d = 0; d < h.size(); ++d)
+      if (flips[d]) h[d] = -h[d];
+    return h;
+  };
+  constexpr std::int64_t tags = 40;
+  for (int n = 0; n < 20000; ++n) {
+    const std::int64_t a = random() % tags, b = random() % tags;
+    if (random() % 12 == 0) {
+      contacts.erase(a);
+      for (std::int64_t other = 0; other < tags; ++other) {
+        reference.erase({a, other});
+        reference.erase({other, a});
+      }
+    } else if (a != b) {
+      History h;
+      if (random() % 4) h = {number(random), number(random), number(random)};
+      contacts.add(a, b, h.empty() ? nullptr : h.data());
+      reference[{a, b}] = h;
+      reference[{b, a}] = turned(h);
+    }
+    ASSERT_EQ(2 * contacts.size(), reference.size());
+    if (n % 50) continue;
+    for (std::int64_t tag = 0; tag < tags; ++tag) {
+      std::map<std::int64_t, History> due;
+      for (auto r = reference.lower_bound({tag, INT64_MIN}); r != reference.end() && r->first.first == tag; ++r)
+        due[r->first.second] = r->second;
+      ASSERT_EQ(seen_by(contacts, tag), due) << "of " << tag << " after " << n << " operations";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace solidcull

@@ -1,0 +1,108 @@
+#include "solid_state.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace solidcull {
+namespace {
+
+struct Touching {
+  MovingSphere a, b;
+};
+
+/// Two touching spheres, carried and turned by one rigid motion.
+Touching in_rigid_motion(std::mt19937& random) {
+  std::normal_distribution<double> n;
+  const auto vector = [&] {
+    const double x = n(random), y = n(random), z = n(random);
+    return Vec3(x, y, z);
+  };
+  const double ra = 0.5 + std::abs(n(random)), rb = 0.5 + std::abs(n(random));
+  const Vec3 at = vector(), direction = vector().normalized(), velocity = vector(), turn = 5 * vector();
+  const auto carried = [&](const Vec3& x, double r) { return MovingSphere{x, velocity + turn.cross(x), turn, r}; };
+  return {carried(at, ra), carried(at + (ra + rb) * direction, rb)};
+}
+
+TEST(ContactVelocity, is_zero_in_any_rigid_motion_of_the_pair) {
+  std::mt19937 random(1);
+  for (int n = 0; n < 1000; ++n) {
+    const Touching t = in_rigid_motion(random);
+    const double scale = t.a.velocity.norm() + t.b.velocity.norm();
+    EXPECT_LE(contact_velocity(t.a, t.b).norm(), 1e-12 * scale);
+  }
+}
+
+TEST(ContactVelocity, is_zero_for_rolling_without_slip) {
+  const Vec3 up(0, 0, 1), axis(0, 1, 0);
+  const double r = 0.3, w = 4;
+  const MovingSphere ground{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), 1.0};
+  const MovingSphere rolling{(1.0 + r) * up, w * axis.cross(r * up), w * axis, r};
+  EXPECT_LE(contact_velocity(ground, rolling).norm(), 1e-15);
+  const MovingSphere spinning{(1.0 + r) * up, Vec3::Zero(), w * axis, r};
+  EXPECT_NEAR(contact_velocity(ground, spinning).norm(), w * r, 1e-14);
+}
+
+TEST(ContactVelocity, is_zero_between_meshing_gears) {
+  const Vec3 axis(0, 0, 1);
+  const MovingSphere a{Vec3::Zero(), Vec3::Zero(), 2 * axis, 1.0};
+  const MovingSphere b{Vec3(1.5, 0, 0), Vec3::Zero(), -4 * axis, 0.5};
+  EXPECT_LE(contact_velocity(a, b).norm(), 1e-15);
+}
+
+TEST(ContactVelocity, is_not_zero_for_approach_and_for_slip) {
+  const MovingSphere a{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), 1.0};
+  const MovingSphere closing{Vec3(2, 0, 0), Vec3(-0.5, 0, 0), Vec3::Zero(), 1.0};
+  const MovingSphere sliding{Vec3(2, 0, 0), Vec3(0, 0.5, 0), Vec3::Zero(), 1.0};
+  EXPECT_EQ(contact_velocity(a, closing), Vec3(-0.5, 0, 0));
+  EXPECT_EQ(contact_velocity(a, sliding), Vec3(0, 0.5, 0));
+}
+
+TEST(ContactVelocity, turns_its_sign_with_the_side) {
+  std::mt19937 random(2);
+  for (int n = 0; n < 100; ++n) {
+    Touching t = in_rigid_motion(random);
+    t.b.velocity += Vec3(1, 2, 3);
+    EXPECT_LE((contact_velocity(t.a, t.b) + contact_velocity(t.b, t.a)).norm(), 1e-12);
+  }
+}
+
+TEST(ContactVelocity, does_not_see_a_spin_about_the_line_of_centres) {
+  const MovingSphere a{Vec3::Zero(), Vec3::Zero(), Vec3(7, 0, 0), 1.0};
+  const MovingSphere b{Vec3(2, 0, 0), Vec3::Zero(), Vec3(-3, 0, 0), 1.0};
+  EXPECT_EQ(contact_velocity(a, b), Vec3(Vec3::Zero()));
+}
+
+const SolidStateLaw law{0.01, 1.5, 10.0, 3};
+
+TEST(SolidStateLaw, a_contact_is_quiet_below_the_speed) {
+  const MovingSphere a{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), 1.0};
+  const auto at_speed = [&](double v) { return MovingSphere{Vec3(2, 0, 0), Vec3(0, v, 0), Vec3::Zero(), 1.0}; };
+  EXPECT_TRUE(law.quiet_contact(a, at_speed(0.0099)));
+  EXPECT_FALSE(law.quiet_contact(a, at_speed(0.0101)));
+}
+
+TEST(SolidStateLaw, a_falling_pair_is_quiet_but_not_at_rest) {
+  const MovingSphere a{Vec3::Zero(), Vec3(0, 0, -9), Vec3::Zero(), 1.0}, b{Vec3(2, 0, 0), Vec3(0, 0, -9), Vec3::Zero(), 1.0};
+  EXPECT_TRUE(law.quiet_contact(a, b));
+  EXPECT_FALSE(law.at_rest(a.velocity, a.spin, a.radius));
+}
+
+TEST(SolidStateLaw, rest_counts_translation_and_the_speed_of_the_surface) {
+  const double r = 0.002;
+  EXPECT_TRUE(law.at_rest(Vec3(0, 0.0099, 0), Vec3::Zero(), r));
+  EXPECT_FALSE(law.at_rest(Vec3(0, 0.0101, 0), Vec3::Zero(), r));
+  EXPECT_TRUE(law.at_rest(Vec3::Zero(), Vec3(4.9, 0, 0), r));   // 0.01 / 0.002 = 5 rad/s
+  EXPECT_FALSE(law.at_rest(Vec3::Zero(), Vec3(5.1, 0, 0), r));
+}
+
+TEST(SolidStateLaw, balance_is_measured_in_granule_weights) {
+  const double m = 0.2, limit = 1.5 * m * 10.0;
+  EXPECT_TRUE(law.balanced(Vec3(0, 0, 0.999 * limit), m));
+  EXPECT_FALSE(law.balanced(Vec3(0, 1.001 * limit, 0), m));
+  EXPECT_TRUE(law.balanced(Vec3::Zero(), m));
+}
+
+}  // namespace
+}  // namespace solidcull
