@@ -134,8 +134,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void found_bodies_anew();
 
   // --- fix_solid_cull_files.cpp: outputs -----------------------------------------------------------------------------------
-  void update_meshes(const std::vector<Ball>& carved);
-  void rebuild_mesh(int body);
+  void update_meshes();
   void write_mesh_files();
   void write_bed_file();
   std::string file_of_step(const std::string& pattern) const;

@@ -23,12 +23,13 @@ const std::map<int, InterfaceMesh>& FixSolidCull::interface_meshes() {
     meshes_wanted_ = true;
     meshes_.clear();
     bodies_.take_merges();
-    update_meshes({});
+    locked_now_.clear();
+    update_meshes();
   }
   return meshes_;
 }
 
-void FixSolidCull::update_meshes(const std::vector<Ball>& carved) {
+void FixSolidCull::update_meshes() {
   const auto timed = watch_.time(Part::mesh);
   for (const auto& merge : bodies_.take_merges()) {
     const auto swallowed = meshes_.find(merge.second);
@@ -61,8 +62,6 @@ void FixSolidCull::update_meshes(const std::vector<Ball>& carved) {
     std::sort(members.begin(), members.end());
     for (const auto& m : members) added[m.second].push_back(place(m.first));
   }
-  for (const Ball& b : carved)
-    for (auto& mesh : meshes_) mesh.second.carve({b.centre, b.radius});
   for (const std::int64_t tag : locked_now_) {
     const int body = bodies_.body_of(tag);
     if (meshes_.count(body)) added[body].push_back(place(tag));

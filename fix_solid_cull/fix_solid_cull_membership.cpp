@@ -85,6 +85,7 @@ void FixSolidCull::change_membership() {
   locked_anywhere_.clear();
   if (change) {
     index_of_.clear();
+    index_of_.reserve(static_cast<std::size_t>(atom->nlocal));
     for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
     free_what_wakes(all);
     if (!all) lock_what_was_chosen();
@@ -93,14 +94,24 @@ void FixSolidCull::change_membership() {
   if (change || stored_everywhere_ > 0) share_exterior();
   if (stored_everywhere_ > 0) keep_shell_closed();
   if (change) {
-    for (const std::int64_t tag : freed_) bodies_.unlock(tag, mass_of(tag), contacts_);
+    std::set<std::pair<int, std::size_t>> cuts;  // which ball took granules from which body
+    for (const std::int64_t tag : freed_) {
+      if (meshes_wanted_)
+        for (std::size_t b = 0; b < balls_.size(); ++b)
+          if ((mass_of(tag).position - balls_[b].centre).norm() <= balls_[b].radius) cuts.emplace(bodies_.body_of(tag), b);
+      bodies_.unlock(tag, mass_of(tag), contacts_);
+    }
+    for (const auto& cut : cuts) {
+      const auto mesh = meshes_.find(cut.first);
+      if (mesh != meshes_.end()) mesh->second.carve({balls_[cut.second].centre, balls_[cut.second].radius});
+    }
     thaw_contacts();
     const std::vector<int> born = bodies_.split(contacts_, [&](std::int64_t tag) { return mass_of(tag); });
     freeze_contacts();
     for (const std::int64_t tag : locked_now_) bodies_.lock(tag, mass_of(tag), contacts_);
     if (meshes_wanted_) {
       for (const int body : born) meshes_.erase(body);
-      update_meshes(balls_);
+      update_meshes();
     }
     store_what_is_deep();
   }

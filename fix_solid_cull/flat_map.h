@@ -1,6 +1,7 @@
 // A hash map from 64-bit keys to small values with open addressing: tags to granules, cells to lists.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -56,8 +57,15 @@ class FlatMap {
     return true;
   }
 
+  /// Makes room for n keys at once.
+  void reserve(std::size_t n) {
+    std::size_t slots = 16;
+    while (slots < 2 * n) slots *= 2;
+    if (slots > slots_.size()) rehash(slots);
+  }
+  /// Empties it; the memory stays for the next use.
   void clear() {
-    slots_.clear();
+    if (size_ != 0) std::fill(slots_.begin(), slots_.end(), Slot{empty_key, Value{}});
     size_ = 0;
   }
   std::size_t size() const { return size_; }

@@ -140,7 +140,7 @@ Settings parse_settings(const std::vector<std::string>& words) {
 }
 
 int look_interval(double mean_diameter, double gravity, double dt) {
-  const double steps = 0.1 * std::sqrt(mean_diameter / gravity) / dt;
+  const double steps = 0.05 * std::sqrt(mean_diameter / gravity) / dt;
   return static_cast<int>(std::clamp(std::round(steps), 10.0, 1000.0));
 }
 

@@ -39,8 +39,8 @@ Settings parse_settings(const std::vector<std::string>& words);
 /// The keywords that parse_settings knows, for the test that holds the command page and the code together.
 std::vector<std::string> setting_keywords();
 
-/// Steps between looks when the deck names none: a tenth of sqrt(d/g), the time in which a granule falls about its own radius
-/// over a hundred; at least 10, at most 1000. d in m, g in m/s^2, dt in s.
+/// Steps between looks when the deck names none: a twentieth of sqrt(d/g), in which a granule that starts to fall reaches the
+/// default speed tolerance two and a half times over; at least 10, at most 1000. d in m, g in m/s^2, dt in s.
 int look_interval(double mean_diameter, double gravity, double dt);
 
 }  // namespace solidcull

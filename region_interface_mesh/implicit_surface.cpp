@@ -133,7 +133,10 @@ struct ImplicitSurface::Impl {
     mask.fill(~std::uint64_t(0));
     std::uint64_t left = ~std::uint64_t(0);
     gather(lo, hi, [&](const Sphere& s) {
-      if (left != 0) left = clear(mask, s.centre / voxel - origin, (s.radius + closing) / voxel);
+      const Vec3 c = s.centre / voxel - origin;
+      const double radius = (s.radius + closing) / voxel;
+      const Vec3 gap = c - c.cwiseMax(0.0).cwiseMin(block_edge - 1.0);
+      if (left != 0 && gap.squaredNorm() < radius * radius) left = clear(mask, c, radius);
     });
 
     ++evaluated;

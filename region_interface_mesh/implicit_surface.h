@@ -22,8 +22,9 @@ struct Voxel {
 };
 
 /// Void is every point that lies at least `closing` outside every granule (so pores are no void); the depth of a point is its
-/// distance to the nearest void, less `closing`. Sparse (OpenVDB mask tree), lazy: a block of 8x8x8 voxels is evaluated when
-/// first asked for, and again after touch() named a change near it. Lengths in m, world frame; local to the rank.
+/// distance to the nearest void, less `closing`. Sparse (a hash of blocks, each a mask of 8x8x8 voxels), lazy: a block is
+/// evaluated when first asked for, and again after touch() named a change near it. Voxel (i, j, k) has its centre at
+/// voxel * (i, j, k). Lengths in m, world frame; local to the rank.
 class ImplicitSurface {
  public:
   /// Calls `visit` with every sphere (granule, halo granule, wall plug) that may overlap the box lo..hi. The visitor tests overlap
@@ -39,13 +40,15 @@ class ImplicitSurface {
   void touch_all();
 
   /// The nearest void voxel whose centre lies within `depth + closing` of p, or Voxel::nothing() if p is deeper than `depth`.
+  /// Exact; of equally near ones the smallest (i, j, k), so the answer does not depend on what was asked before.
   /// `hint`: a voxel found earlier for this point; if it is still void and in reach, it is returned after one look.
   Voxel void_within(const Vec3& p, double depth, const Voxel& hint = Voxel::nothing());
 
   bool is_void(const Voxel& v);             ///< evaluates the block if needed
   Vec3 centre(const Voxel& v) const;        ///< m, world frame
 
-  /// Depth of p, or `max_depth` if it is deeper. Exact up to half a voxel's diagonal.
+  /// Depth of p, or `max_depth` if it is deeper; negative outside the closed granules, down to -closing. Never less than the true
+  /// depth; more by a voxel's diagonal at most where the void is wider than that, and by a quarter of a voxel on average.
   double depth(const Vec3& p, double max_depth);
 
   std::size_t blocks_evaluated() const;     ///< since construction: the work counter that benchmarks report

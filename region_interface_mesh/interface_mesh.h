@@ -19,7 +19,8 @@ struct TriangleMesh {
 };
 
 /// A persistent level set around the granules of a solid body, negative inside, closed over the pores between granules.
-/// Additions and carvings are queued and done when a question is asked, so a run that never asks pays nothing.
+/// Additions and carvings are queued and done when a question is asked, so a run that never asks pays nothing (but for a queue of
+/// four million spheres at most). The mesh depends on the order of these calls, never on when a question came between them.
 /// All lengths in m, world frame. Every member is local to the calling rank. Not thread-safe.
 class InterfaceMesh {
  public:
@@ -33,14 +34,16 @@ class InterfaceMesh {
   InterfaceMesh& operator=(const InterfaceMesh&) = delete;
 
   /// CSG union with the closed union of these granules. Pores between new granules and `context` (granules that are in the
-  /// body already, near the new ones) are closed too; the context itself is not added again.
-  /// No sphere is dropped for being small against the voxel: see ParticlesToLevelSet's Rmin in the .cpp.
+  /// body already, near the new ones) are closed too; of the context only what lies within r + 2 closing of a new granule is
+  /// added again: nothing farther away changes. Throws std::invalid_argument for what is no sphere.
+  /// No sphere is dropped for being small against the voxel: below 0.9 voxels it is held with a radius of 0.9 voxels.
   void add(const std::vector<Sphere>& granules, const std::vector<Sphere>& context = {});
 
   /// CSG difference with a ball: what the carve law takes away.
   void carve(const Sphere& ball);
 
-  /// CSG union with the other body's surface (bodies that merged). The other one is left empty.
+  /// CSG union with the other body's surface (bodies that merged). The other one is left empty and may be used again.
+  /// Throws std::invalid_argument if its voxel differs.
   void merge(InterfaceMesh&& other);
 
   bool empty() const;                       ///< nothing inside
@@ -51,13 +54,14 @@ class InterfaceMesh {
   Vec3 normal(const Vec3& p) const;
   /// Corners of the axis-aligned box around all that is inside; both zero if empty.
   void bounds(Vec3& lo, Vec3& hi) const;
-  double volume() const;                    ///< enclosed volume in m^3
+  double volume() const;                    ///< enclosed volume in m^3; of a ball of 10 voxels to 0.1 %
   double half_width() const;                ///< |signed_distance| saturates here (m)
 
   /// The surface as triangles. adaptivity 0..1 merges flat parts (OpenVDB volumeToMesh).
   TriangleMesh triangles(double adaptivity = 0.0) const;
 
-  /// The grid as bytes (OpenVDB stream) for sending to another rank or into a restart file; from_bytes is the inverse.
+  /// The grid as bytes (OpenVDB stream) for sending to another rank or into a restart file; from_bytes is the inverse, and
+  /// throws std::runtime_error for bytes that are no mesh or have another voxel.
   std::string to_bytes() const;
   static InterfaceMesh from_bytes(const std::string& bytes, double voxel, double closing);
 

@@ -12,7 +12,7 @@ namespace solidcull {
 namespace {
 
 constexpr double voxel = 1e-3;  // m
-const double half_diagonal = 0.5 * std::sqrt(3.0) * voxel;
+const double diagonal = std::sqrt(3.0) * voxel;  // the void voxel nearest to a point may lie this much behind the nearest void
 
 /// Spheres that a test may change while a surface looks at them.
 struct Bed {
@@ -117,7 +117,7 @@ TEST(ImplicitSurface, depth_in_a_lattice_is_the_distance_to_its_faces) {
     const double reach = d / 2 + closing, gap = d / std::sqrt(2.0);
     const double sagitta = reach - std::sqrt(reach * reach - gap * gap);
     const double depth = surface.depth(s.centre, 5 * d);
-    EXPECT_LE(depth, std::min(to_face, 5 * d) + half_diagonal);
+    EXPECT_LE(depth, std::min(to_face, 5 * d) + diagonal);
     EXPECT_GE(depth, std::min(to_face - sagitta, 5 * d) - 1e-12);
   }
 }
@@ -128,7 +128,7 @@ TEST(ImplicitSurface, pores_are_no_void) {
   const Vec3 pore = 0.5 * (bed.spheres[444].centre + bed.spheres[555].centre);
   ASSERT_TRUE(bed.is_void(pore, 0.0));
   ImplicitSurface open = bed.surface(0.0), closed = bed.surface(0.5 * d);
-  EXPECT_LT(open.depth(pore, 3 * d), half_diagonal);
+  EXPECT_LT(open.depth(pore, 3 * d), 0.5 * d);
   EXPECT_EQ(closed.depth(pore, 3 * d), 3 * d);
 }
 
@@ -156,7 +156,7 @@ TEST(ImplicitSurface, depth_of_a_ball_is_that_of_its_surface) {
       const Vec3 p = bed.spheres[0].centre + r * voxel * Vec3(0.6, -0.48, 0.64);
       const double depth = surface.depth(p, 20 * voxel), exact = (15 - r) * voxel;
       EXPECT_GE(depth, exact - 1e-12);
-      EXPECT_LE(depth, exact + half_diagonal);
+      EXPECT_LE(depth, exact + diagonal);
     }
   }
 }

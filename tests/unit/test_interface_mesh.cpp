@@ -129,10 +129,11 @@ TEST(InterfaceMesh, closing_gives_a_ball_back) {
   for (const double closing : {0.4 * voxel, 1.0 * voxel, 2.7 * voxel, 8.0 * voxel}) {
     InterfaceMesh mesh(voxel, closing);
     mesh.add({ball});
-    EXPECT_NEAR(mesh.volume(), ball_volume(ball.radius), 0.01 * ball_volume(ball.radius)) << closing;
+    // The closed surface may lie 0.04 voxels off, which is 2 % of this ball.
+    EXPECT_NEAR(mesh.volume(), ball_volume(ball.radius), 0.02 * ball_volume(ball.radius)) << closing;
     const Vec3 out = Vec3(1, 2, -0.5).normalized();
     for (const double offset : {-2.0, -1.0, 0.0, 1.0, 2.0})
-      EXPECT_NEAR(mesh.signed_distance(ball.centre + (ball.radius + offset * voxel) * out), offset * voxel, 0.15 * voxel)
+      EXPECT_NEAR(mesh.signed_distance(ball.centre + (ball.radius + offset * voxel) * out), offset * voxel, 0.1 * voxel)
           << closing;
   }
 }
