@@ -148,4 +148,4 @@ def film_strip(moments, file, pixels=700):
     full = io.BytesIO()
     fig.savefig(full, dpi=110)
     plt.close(fig)
-    Image.open(full).convert("RGB").quantize(96).save(file, optimize=True)  # a third of the size
+    Image.open(full).convert("RGB").quantize(200, Image.Quantize.MAXCOVERAGE).save(file, optimize=True)  # a third of the size

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <thread>
 
@@ -35,6 +36,16 @@ constexpr double standard_gravity = 9.81;  // m/s^2, the scale where the deck ha
 
 Vec3 vec(const double* v) { return Vec3(v[0], v[1], v[2]); }
 void clear(double* to) { to[0] = to[1] = to[2] = 0; }
+
+/// Invariants are checked at every reneighbouring in debug builds, and in any build when SOLIDCULL_CHECK is in the environment.
+bool checking() {
+#ifdef NDEBUG
+  static const bool asked = std::getenv("SOLIDCULL_CHECK") != nullptr;
+  return asked;
+#else
+  return true;
+#endif
+}
 
 Settings parse(int narg, char** arg, LAMMPS_NS::Error* error, const char* id) {
   try {
@@ -305,6 +316,30 @@ void FixSolidCull::pre_neighbor() {
       if (atom->mask[i] & bit) ghost_interface_[atom->tag[i]] = 1;
   }
   check_inserted();
+  if (checking()) check_invariants();
+}
+
+void FixSolidCull::check_invariants() {
+  // I1: ghosts are here, so every exterior granule near this rank's interior ones is seen
+  const int bit = group->bitmask[interface_group_];
+  for (int i = 0; i < atom->nlocal + atom->nghost; ++i) {
+    if (atom->mask[i] & bit) continue;
+    store_->for_each_near(sphere(i), 0.0, [&](const StoredGranule& g) {
+      broken("exterior granule " + std::to_string(atom->tag[i]) + " touches interior granule " + std::to_string(g.tag));
+    });
+  }
+  // I2: the ledger
+  if (ledger_.count_due() != static_cast<std::int64_t>(store_->size()))
+    broken("the ledger has " + std::to_string(ledger_.count_due()) + " granules in the store, which holds " + std::to_string(store_->size()));
+  const double mass = store_->mass();
+  if (std::abs(ledger_.mass_error(*store_)) > 1e-12 * mass) broken("mass in the store differs from the ledger");
+  for (int d = 0; d < 3; ++d)
+    if (std::abs(ledger_.moment_error(*store_, d)) > 1e-12 * mass * domain->prd[d]) broken("the first moment of the store differs from the ledger");
+  // every locked granule is a member of a body, and nothing else is
+  std::size_t locked = store_->size();
+  for (int i = 0; i < atom->nlocal; ++i) locked += shell_[i].locked;
+  if (locked != bodies_.locked())
+    broken(std::to_string(bodies_.locked()) + " granules are in bodies and " + std::to_string(locked) + " are locked");
 }
 
 void FixSolidCull::setup_pre_force(int) {
@@ -430,8 +465,10 @@ void FixSolidCull::pre_final_integrate() {
 void FixSolidCull::end_of_step() {
   if (!store_) return;
   const auto due = [&](int every) { return every > 0 && update->ntimestep % every == 0; };
-  if (due(settings_.mesh_every)) write_mesh_files();
-  if (due(settings_.bed_every)) write_bed_file();
+  for (const Output& o : settings_.meshes)
+    if (due(o.every)) write_mesh_file(o.file);
+  for (const Output& o : settings_.beds)
+    if (due(o.every)) write_bed_file(o.file);
 }
 
 // ------------------------------------------------------------------------------------------------------------ numbers

@@ -80,6 +80,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void take_loads();
   void rebase_thawed_contacts();
   void ask_for_reneighbouring_if_waking();
+  void check_invariants();                   // I1 and I2; local
   bool any_rank(bool here) const;
   void say(const std::string& line) const;
   double closing() const;        // radius of the ball that fits into no pore (m)
@@ -135,8 +136,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
 
   // --- fix_solid_cull_files.cpp: outputs -----------------------------------------------------------------------------------
   void update_meshes();
-  void write_mesh_files();
-  void write_bed_file();
+  void write_mesh_file(const std::string& pattern);
+  void write_bed_file(const std::string& pattern);
   std::string file_of_step(const std::string& pattern) const;
 
   Settings settings_;

@@ -78,7 +78,7 @@ std::string FixSolidCull::file_of_step(const std::string& pattern) const {
   return pattern.substr(0, star) + std::to_string(update->ntimestep) + pattern.substr(star + 1);
 }
 
-void FixSolidCull::write_mesh_files() {
+void FixSolidCull::write_mesh_file(const std::string& pattern) {
   const std::map<int, int> number = global_bodies();
   const std::map<int, InterfaceMesh>& mine = interface_meshes();
   const auto timed = watch_.time(Part::files);
@@ -119,7 +119,7 @@ void FixSolidCull::write_mesh_files() {
   }
   std::string failure;
   if (comm->me == 0) try {
-      const std::string file = file_of_step(settings_.mesh_file);
+      const std::string file = file_of_step(pattern);
       const std::string ending = file.substr(file.size() - 4);
       if (ending == ".vdb") {
         std::vector<const InterfaceMesh*> grids;
@@ -147,7 +147,7 @@ void FixSolidCull::write_mesh_files() {
   if (any_rank(!failure.empty())) refuse("keyword 'mesh': " + failure + "; nothing of the run is lost but it stops here");
 }
 
-void FixSolidCull::write_bed_file() {
+void FixSolidCull::write_bed_file(const std::string& pattern) {
   const auto timed = watch_.time(Part::files);
   constexpr int columns = 11;
   std::vector<double> rows;
@@ -186,7 +186,7 @@ void FixSolidCull::write_bed_file() {
         bed.state.push_back(static_cast<int>(r[9]));
         bed.body.push_back(static_cast<int>(r[10]));
       }
-      write_bed_vtp(file_of_step(settings_.bed_file), bed);
+      write_bed_vtp(file_of_step(pattern), bed);
     } catch (const std::exception& e) {
       failure = e.what();
     }

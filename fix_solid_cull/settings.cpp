@@ -96,13 +96,13 @@ const std::map<std::string, Reader>& readers() {
       {"voxel", [](Values& v, Settings& s) { s.voxel = v.number("a size in mean diameters, 0.1 to 2", 0.1, true, 2.0); }},
       {"mesh",
        [](Values& v, Settings& s) {
-         s.mesh_every = v.whole("a whole number of steps, 1 or more, and a file name", 1);
-         s.mesh_file = v.file({".vdb", ".stl", ".vtp"}, "a file name that ends with .vdb, .stl or .vtp");
+         const int every = v.whole("a whole number of steps, 1 or more, and a file name", 1);
+         s.meshes.push_back({every, v.file({".vdb", ".stl", ".vtp"}, "a file name that ends with .vdb, .stl or .vtp")});
        }},
       {"bed",
        [](Values& v, Settings& s) {
-         s.bed_every = v.whole("a whole number of steps, 1 or more, and a file name", 1);
-         s.bed_file = v.file({".vtp"}, "a file name that ends with .vtp");
+         const int every = v.whole("a whole number of steps, 1 or more, and a file name", 1);
+         s.beds.push_back({every, v.file({".vtp"}, "a file name that ends with .vtp")});
        }},
   };
   return table;

@@ -12,6 +12,12 @@ enum class Walls { closed, surface };
 enum class Store { exact };
 enum class Restore { exact };
 
+/// A file every so many steps; a '*' in its name becomes the step.
+struct Output {
+  int every;
+  std::string file;
+};
+
 struct Settings {
   int every = 0;                 ///< steps between looks; 0: from the deck's own scales, see look_interval()
   double depth = 2.0;            ///< cover, in mean granule diameters
@@ -27,10 +33,8 @@ struct Settings {
   Store store = Store::exact;
   Restore restore = Restore::exact;
   double voxel = 0.5;            ///< in mean diameters
-  int mesh_every = 0;            ///< 0: no mesh files
-  std::string mesh_file;
-  int bed_every = 0;             ///< 0: no bed files
-  std::string bed_file;
+  std::vector<Output> meshes;    ///< interface meshes; the keyword may stand more than once
+  std::vector<Output> beds;      ///< the whole bed; likewise
 };
 
 /// Parses `keyword value ...`. Throws InputError that names keyword and value as typed, and what to do.

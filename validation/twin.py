@@ -44,7 +44,7 @@ class TwinError(Exception):
 # --- the deck -------------------------------------------------------------------------------------------------------
 
 def read_deck(path):
-    """Logical lines of a deck (`&` joined); a file that it includes is put in place when it holds the fix line."""
+    """Logical lines of a deck (`&` joined); a file that it includes is put in place when it holds the fix line or thermo columns."""
     try:
         text = Path(path).read_text()
     except OSError as e:
@@ -53,7 +53,7 @@ def read_deck(path):
     for line in re.sub(r"&[ \t]*\n", " ", text).splitlines():
         included = re.match(r"\s*include\s+(\S+)", line)
         file = Path(path).parent / included[1] if included else None
-        if file and file.is_file() and "solid/cull" in file.read_text():
+        if file and file.is_file() and re.search("solid/cull|thermo_style", file.read_text()):
             lines += read_deck(file)
         else:
             lines.append(line)
@@ -159,7 +159,8 @@ def check_metrics(metrics, lines):
     for metric in metrics:
         reducer_of(metric)
     styles = [words_of(line)[1:] for line in lines if words_of(line)[:1] == ["thermo_style"]]
-    if not styles or any(s[:1] != ["custom"] for s in styles[:-1]) or any(words_of(line)[:1] == ["include"] for line in lines):
+    hidden = any(words_of(line)[:1] == ["include"] and "$" in line for line in lines)
+    if hidden or any(s[:1] != ["custom"] for s in styles[:-1]) or len(styles) < 2:  # the last one may be end_of_deck's
         return
     columns = list(dict.fromkeys(c for s in styles if s[:1] == ["custom"] for c in s[1:]))
     bare = [re.sub(r"^[cfv]_", "", c) for c in columns] + [THERMO_WORDS.get(c) for c in columns]

@@ -1,5 +1,6 @@
 """Settles the bed once, strikes it unculled and culled, and leaves the table, a plot and pictures in out/."""
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -74,6 +75,14 @@ def plot(runs, file):
     plt.close(fig)
 
 
+def run_for_files(launcher):
+    """One more culled run, not timed, that writes what ParaView opens and the pictures are drawn from."""
+    files = " bed 400 out/bed.*.vtp mesh 400 out/mesh.*.vtp mesh 4000 out/mesh.*.vdb"
+    deck = re.sub(r"^(fix\s+\S+\s+\S+\s+solid/cull.*)$", r"\1" + files, (HERE / "impact.in").read_text(), flags=re.M)
+    (OUT / "files.in").write_text(deck)
+    twin.run_liggghts(launcher, OUT / "files.in", HERE, OUT / "files.log", {})
+
+
 def draw(count=4):
     """Cut-away pictures at a few times; False when the fix has left no files to draw."""
     steps = pictures.steps_of(OUT / "bed.*.vtp")
@@ -102,6 +111,7 @@ def main():
     text = twin.table(result)
     (OUT / "table.txt").write_text(text + "\n")
     plot(runs, OUT / "impact.png")
+    run_for_files(launcher)
     drawn = draw()
     print(f"\n{text}\n\nplot: {OUT / 'impact.png'}" + (f"\npictures: {OUT / 'cut-away.png'}" if drawn else
           "\nno pictures: the fix wrote no out/bed.*.vtp"))

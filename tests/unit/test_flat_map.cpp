@@ -110,14 +110,31 @@ TEST(FlatMap, holds_values_that_own_memory) {
   for (int k = 1; k < 1000; k += 2) EXPECT_EQ(*map.find(k), std::string(40, static_cast<char>('a' + k % 26)));
 }
 
-TEST(FlatMap, clear_gives_the_memory_back) {
+TEST(FlatMap, clear_empties_it_and_keeps_the_memory) {
   FlatMap<int> map;
-  for (int k = 0; k < 1000; ++k) map[k] = k;
+  for (int k = 0; k < 1000; ++k) map[k] = k + 1;
+  const std::size_t bytes = map.memory_bytes();
   map.clear();
   EXPECT_TRUE(map.empty());
+  EXPECT_EQ(map.memory_bytes(), bytes);
   EXPECT_EQ(map.find(1), nullptr);
-  map[1] = 2;
+  map.for_each([](std::int64_t, int) { ADD_FAILURE(); });
+  EXPECT_EQ(map[1], 0);
   EXPECT_EQ(map.size(), 1u);
+}
+
+TEST(FlatMap, reserve_makes_room_and_loses_nothing) {
+  FlatMap<int> map;
+  Reference reference;
+  for (int k = 0; k < 50; ++k) map[7 * k] = reference[7 * k] = k;
+  map.reserve(10000);
+  expect_same(map, reference);
+  const std::size_t bytes = map.memory_bytes();
+  for (int k = 0; k < 10000; ++k) map[k] = reference[k] = k;
+  EXPECT_EQ(map.memory_bytes(), bytes);
+  expect_same(map, reference);
+  map.reserve(1);
+  expect_same(map, reference);
 }
 
 }  // namespace

@@ -87,7 +87,7 @@ std::vector<T> array_of(const std::string& xml, const std::string& name, const s
   const auto length = number_at<std::uint64_t>(bytes, 0);
   if (bytes.size() != 8 + length) throw std::runtime_error("array " + name + " has a wrong length");
   std::vector<T> values(length / sizeof(T));
-  std::memcpy(values.data(), bytes.data() + 8, length);
+  if (!values.empty()) std::memcpy(values.data(), bytes.data() + 8, length);
   return values;
 }
 

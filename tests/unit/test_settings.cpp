@@ -30,6 +30,14 @@ std::string refusal(const std::string& line) {
   return {};
 }
 
+using Outputs = std::vector<std::pair<int, std::string>>;
+
+Outputs listed(const std::vector<Output>& outputs) {
+  Outputs list;
+  for (const Output& o : outputs) list.emplace_back(o.every, o.file);
+  return list;
+}
+
 void expect_same(const Settings& a, const Settings& b) {
   EXPECT_EQ(a.every, b.every);
   EXPECT_EQ(a.depth, b.depth);
@@ -45,10 +53,8 @@ void expect_same(const Settings& a, const Settings& b) {
   EXPECT_EQ(a.store, b.store);
   EXPECT_EQ(a.restore, b.restore);
   EXPECT_EQ(a.voxel, b.voxel);
-  EXPECT_EQ(a.mesh_every, b.mesh_every);
-  EXPECT_EQ(a.mesh_file, b.mesh_file);
-  EXPECT_EQ(a.bed_every, b.bed_every);
-  EXPECT_EQ(a.bed_file, b.bed_file);
+  EXPECT_EQ(listed(a.meshes), listed(b.meshes));
+  EXPECT_EQ(listed(a.beds), listed(b.beds));
 }
 
 // ----------------------------------------------------------------------------------------------------------- what is taken
@@ -69,10 +75,8 @@ TEST(Settings, without_keywords_are_the_defaults) {
   EXPECT_EQ(s.store, Store::exact);
   EXPECT_EQ(s.restore, Restore::exact);
   EXPECT_EQ(s.voxel, 0.5);
-  EXPECT_EQ(s.mesh_every, 0);
-  EXPECT_EQ(s.mesh_file, "");
-  EXPECT_EQ(s.bed_every, 0);
-  EXPECT_EQ(s.bed_file, "");
+  EXPECT_TRUE(s.meshes.empty());
+  EXPECT_TRUE(s.beds.empty());
 }
 
 TEST(Settings, every_keyword_is_parsed) {
@@ -87,10 +91,8 @@ TEST(Settings, every_keyword_is_parsed) {
   due.carve_cap = 6;
   due.walls = Walls::surface;
   due.voxel = 0.25;
-  due.mesh_every = 100;
-  due.mesh_file = "out/mesh.*.vdb";
-  due.bed_every = 200;
-  due.bed_file = "bed.vtp";
+  due.meshes = {{100, "out/mesh.*.vdb"}};
+  due.beds = {{200, "bed.vtp"}};
   const std::string line =
       "every 40 depth 3.5 exterior live speed 1e-3 calm 5 tolerance 0.5 0.1 carve 1.5 6 motion fixed walls surface store exact "
       "restore exact voxel 0.25 mesh 100 out/mesh.*.vdb bed 200 bed.vtp";
@@ -112,9 +114,10 @@ TEST(Settings, the_limits_themselves_are_allowed) {
     EXPECT_EQ(refusal(line), "") << line;
 }
 
-TEST(Settings, files_keep_the_star_for_the_step) {
-  EXPECT_EQ(parsed("mesh 5 a.*.stl").mesh_file, "a.*.stl");
-  EXPECT_EQ(parsed("bed 5 b_*.vtp").bed_file, "b_*.vtp");
+TEST(Settings, files_may_be_several_and_keep_the_star_for_the_step) {
+  const Settings s = parsed("mesh 5 a.*.stl bed 6 b_*.vtp mesh 7 a.*.vdb bed 8 c.vtp");
+  EXPECT_EQ(listed(s.meshes), (Outputs{{5, "a.*.stl"}, {7, "a.*.vdb"}}));
+  EXPECT_EQ(listed(s.beds), (Outputs{{6, "b_*.vtp"}, {8, "c.vtp"}}));
 }
 
 // --------------------------------------------------------------------------------------------------------- what is refused
@@ -221,10 +224,10 @@ TEST(Settings, each_keyword_is_refused_without_a_value) {
 
 // --------------------------------------------------------------------------------------------------------------- intervals
 
-TEST(LookInterval, is_a_tenth_of_the_time_in_which_a_granule_falls_its_diameter) {
-  EXPECT_EQ(look_interval(0.0026, 9.81, 3e-5), 54);  // 0.1 sqrt(0.0026 / 9.81) = 1.628e-3 s
-  EXPECT_EQ(look_interval(0.0026, 9.81, 1e-5), 163);
-  EXPECT_EQ(look_interval(0.0026, 9.81 / 4, 3e-5), 109);
+TEST(LookInterval, is_a_twentieth_of_the_deck_s_own_time) {
+  EXPECT_EQ(look_interval(0.0026, 9.81, 3e-5), 27);  // 0.05 sqrt(0.0026 / 9.81) = 8.14e-4 s
+  EXPECT_EQ(look_interval(0.0026, 9.81, 1e-5), 81);
+  EXPECT_EQ(look_interval(0.0026, 9.81 / 4, 3e-5), 54);
 }
 
 TEST(LookInterval, stays_between_10_and_1000_steps) {
@@ -284,7 +287,7 @@ TEST(CommandPage, names_the_defaults_of_the_code) {
     const std::set<std::string> named(w.begin(), w.end());
     // a number of steps that depends on the deck, and files that are not written: told in words
     for (const std::string& k : setting_keywords())
-      if (k != "every" && k != "mesh" && k != "bed") EXPECT_TRUE(named.count(k)) << "no default for " << k;
+      EXPECT_TRUE(named.count(k) || k == "every" || k == "mesh" || k == "bed") << "no default for " << k;
     return;
   }
   ADD_FAILURE() << "no line of defaults that begins with depth";
