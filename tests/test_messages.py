@@ -1,0 +1,397 @@
+"""What a user reads: each refusal by its text, in tiny decks through the launcher; and that the plug-in changes nothing unasked."""
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LAUNCHER = Path(os.environ.get("SOLIDCULL_LAUNCHER", ROOT / "build/liggghts-solidcull")).resolve()
+LIBRARY = LAUNCHER.parent / "libsolidcull.so"
+STOCK = shutil.which("liggghts")
+TIME_LIMIT = 60  # s for one deck
+
+MPI = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_plm_rsh_agent": "",
+       "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMP_NUM_THREADS": "1"}
+
+HERTZ = "gran model hertz tangential history"
+MATERIAL = """\
+fix m1 all property/global youngsModulus peratomtype 5.e6
+fix m2 all property/global poissonsRatio peratomtype 0.3
+fix m3 all property/global coefficientRestitution peratomtypepair 1 0.3
+fix m4 all property/global coefficientFriction peratomtypepair 1 0.5
+"""
+FIX = "fix cull all solid/cull"
+
+
+def deck(*lines, style="granular", newton="off", box="block 0 0.012 0 0.012 -0.001 0.04", pair=HERTZ, granules=True, before=""):
+    """Granules of 3 mm, one above the other in a small box; `lines` come last."""
+    head = f"""\
+atom_style {style}
+atom_modify map array
+{before}
+boundary f f f
+newton {newton}
+communicate single vel yes
+units si
+region box {box} units box
+create_box 1 box
+neighbor 0.0004 bin
+neigh_modify delay 0
+"""
+    body = MATERIAL + f"""\
+pair_style {pair}
+pair_coeff * *
+timestep 2e-5
+fix grav all gravity 9.81 vector 0 0 -1
+fix floor all wall/gran model hertz tangential history primitive type 1 zplane 0
+create_atoms 1 single 0.006 0.006 0.0015 units box
+create_atoms 1 single 0.006 0.006 0.0045 units box
+set group all diameter 0.003 density 2500
+fix integrate all nve/sphere
+thermo_modify lost error norm no
+"""
+    return head + (body if granules else "") + "\n".join(lines) + "\n"
+
+
+# 343 granules of 3 mm that fill their box: its sides are walls, so three of four layers are soon culled
+BLOCK = deck(
+    *[f"fix {d}{k} all wall/gran model hertz tangential history primitive type 1 {d}plane {x}"
+      for d in "xy" for k, x in enumerate((0, 0.021))],
+    "delete_atoms group all",
+    "lattice sc 0.003 origin 0.5 0.5 0.5",
+    "region fill block 0 0.021 0 0.021 0 0.021 units box",
+    "create_atoms 1 region fill",
+    "set group all diameter 0.003 density 2500",
+    box="block 0 0.021 0 0.021 -0.001 0.06")
+CULL_BLOCK = FIX + " every 10 calm 1 depth 1 speed 0.5 tolerance 30 0"
+
+POUR = deck(
+    *[f"fix {d}{k} all wall/gran model hertz tangential history primitive type 1 {d}plane {x}"
+      for d in "xy" for k, x in enumerate((0, 0.024))],
+    "delete_atoms group all",
+    "fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0014",
+    "fix t2 all particletemplate/sphere 15485867 atom_type 1 density constant 2500 radius constant 0.0016",
+    "fix dist all particledistribution/discrete 32452843 2 t1 0.5 t2 0.5",
+    "region pour block 0 0.024 0 0.024 0.002 0.058 units box",
+    "fix ins all insert/pack seed 32452867 distributiontemplate dist maxattempt 200 insert_every once overlapcheck yes all_in yes "
+    "vel constant 0 0 -0.3 region pour particles_in_region 500",
+    box="block 0 0.024 0 0.024 -0.001 0.06")
+
+
+class Run:
+    """A deck, run in a folder of its own."""
+
+    def __init__(self, text, program=None, ranks=1, preload=None):
+        with tempfile.TemporaryDirectory(prefix="solidcull-") as folder:
+            place = Path(folder)
+            (place / "deck.in").write_text(text)
+            # not `-screen none`: the stock engine's insertion fixes write to a screen that is not there
+            words = [str(program or LAUNCHER), "-in", "deck.in", "-log", "log", "-screen", "screen"]
+            if ranks > 1:
+                words = ["mpirun", "-np", str(ranks)] + words
+            env = {**os.environ, **MPI, **({"LD_PRELOAD": str(preload)} if preload else {})}
+            done = subprocess.run(words, cwd=place, env=env, timeout=TIME_LIMIT, text=True, stdout=subprocess.PIPE,
+                                  stderr=subprocess.STDOUT, check=False)
+            self.status = done.returncode
+            self.output = done.stdout
+            self.screen = (place / "screen").read_text() if (place / "screen").exists() else ""
+            self.log = (place / "log").read_text() if (place / "log").exists() else ""
+            self.files = sorted(p.name for p in place.iterdir())
+
+    @staticmethod
+    def errors(text):
+        return [re.sub(r" \(\S+:\d+\)$", "", line) for line in text.splitlines() if line.startswith("ERROR")]
+
+    def thermo(self):
+        """Lines of numbers only: step by step output, to the last digit."""
+        return [line for line in self.log.splitlines() if re.fullmatch(r"\s*-?\d[-+.\deE\s]*", line) and len(line.split()) > 2]
+
+
+@unittest.skipUnless(LAUNCHER.exists(), f"no {LAUNCHER}: build it, or name it in SOLIDCULL_LAUNCHER")
+class Case(unittest.TestCase):
+    maxDiff = None
+
+    def refused(self, text, line, **how):
+        run = Run(text, **how)
+        told = f"screen:\n{run.screen[-2000:]}\noutput:\n{run.output[-2000:]}"
+        self.assertEqual(run.errors(run.screen), ["ERROR: " + line], told)
+        self.assertEqual(run.errors(run.log), ["ERROR: " + line])
+        self.assertNotEqual(run.status, 0, told)
+        return run
+
+    def refused_by_fix(self, text, line, fix="cull", **how):
+        return self.refused(text, f"fix {fix} solid/cull: {line}", **how)
+
+    def accepted(self, text, **how):
+        run = Run(text, **how)
+        self.assertEqual(run.errors(run.screen + run.output), [], run.screen[-2000:])
+        self.assertEqual(run.status, 0, run.screen[-2000:] + run.output[-2000:])
+        return run
+
+
+class DeckRefusals(Case):
+    def test_the_tiny_deck_itself_is_accepted(self):
+        self.accepted(deck(FIX, "run 20"))
+
+    def test_newton_on(self):
+        self.refused_by_fix(deck(FIX, newton="on", granules=False), "newton is on: put 'newton off' at the top of the deck")
+
+    def test_atom_style_without_granules(self):
+        for style in ("atomic", "ellipsoid"):
+            self.refused_by_fix(deck(FIX, style=style, granules=False),
+                                f"atom style '{style}' has no granules: use atom_style granular")
+
+    def test_atoms_without_tags(self):
+        self.refused_by_fix(deck(FIX, granules=False, before="atom_modify id no"),
+                            "atoms have no tags: put 'atom_modify id yes' into the deck")
+
+    def test_triclinic_box(self):
+        self.refused_by_fix(deck(FIX, granules=False, box="prism 0 0.02 0 0.02 0 0.04 0.002 0 0"),
+                            "the box is triclinic: use an orthogonal one")
+
+    def test_second_solid_cull(self):
+        self.refused_by_fix(deck(FIX, "fix again all solid/cull"),
+                            "fix cull is a solid/cull already: give one fix a group that holds all granules", fix="again")
+
+    def test_no_group_left(self):
+        groups = [f"group g{k} id 1" for k in range(31)]
+        self.refused_by_fix(deck(*groups, FIX), "all 32 groups are taken and interface granules need one: delete a group")
+
+    def test_pair_style_not_granular(self):
+        self.refused_by_fix(deck(FIX, "run 0", pair="soft 0.003"), "pair_style 'soft' is not granular: use pair_style gran")
+
+    def test_no_pair_style(self):
+        self.refused_by_fix(deck(FIX, "run 0", pair="none").replace("pair_coeff * *\n", ""),
+                            "pair_style 'none' is not granular: use pair_style gran")
+
+    def test_run_style(self):
+        self.refused_by_fix(deck(FIX, "run_style respa 2 2", "run 0"), "run_style 'respa' is not supported: use run_style verlet")
+
+    def test_stored_contact_forces(self):
+        self.refused_by_fix(deck(FIX, "compute c all pair/gran/local force", "run 0").replace(
+            f"pair_style {HERTZ}\n", f"pair_style {HERTZ} computeForceContact on\n"),
+            "contact forces are stored per contact (store_force_contact): those of culled granules would be missing")
+
+
+class MissedPhysics(Case):
+    """Fixes whose physics the culled granules would miss: refused whichever of the two lines comes first."""
+
+    def missed(self, lines, name, why, **how):
+        line = f"fix {name}: {why}; leave one of the two fixes out"
+        self.refused_by_fix(deck(*lines, FIX, "run 0", **how), line)
+        self.refused_by_fix(deck(FIX, *lines, "run 0", **how), line)
+
+    def test_heat_conduction(self):
+        self.missed(["fix h1 all property/global thermalConductivity peratomtype 5.",
+                     "fix h2 all property/global thermalCapacity peratomtype 10.",
+                     "fix heat all heat/gran/conduction initial_temperature 300."],
+                    "heat heat/gran/conduction", "heat conduction would miss the culled granules")
+
+    def test_cfd_coupling(self):
+        self.missed(["fix cfd all couple/cfd couple_every 10 file ./"], "cfd couple/cfd", "CFD coupling would miss the culled granules")
+
+    def test_sph(self):
+        self.missed(["fix sph all sph/density/continuity"], "sph sph/density/continuity", "SPH would miss the culled granules")
+
+    def test_growing_radii(self):
+        self.missed(["variable d equal 0.003", "fix grow all adapt 1 atom diameter v_d"],
+                    "grow adapt", "radii that change (fix adapt) would leave the culled granules behind")
+
+    def test_multisphere(self):
+        self.missed(["fix clumps all multisphere"], "clumps multisphere", "multisphere clumps are not supported yet")
+
+    def test_rigid(self):
+        self.missed(["fix clump all rigid single"], "clump rigid", "rigid clumps of granules are not supported yet")
+
+    def test_box_that_changes_its_size(self):
+        run = self.refused_by_fix(
+            deck(FIX, "fix pull all deform 1 z final 0 0.05 units box", "run 0").replace("boundary f f f", "boundary f f p"),
+            "the box changes its size (fix deform, press/berendsen, ...): a culled bed cannot follow; leave that fix out")
+        self.assertEqual(run.errors(run.output), [])
+
+    def test_renumbered_granules(self):
+        insert = POUR.replace("particles_in_region 500", "particles_in_region 20").replace("all_in yes", "all_in yes compress_tags yes")
+        self.refused_by_fix(insert + FIX + "\nrun 0\n", "fix ins insert/pack: compress_tags would renumber granules that are "
+                            "culled; say 'compress_tags no'")
+
+
+class KeywordRefusals(Case):
+    STEPS = "a whole number of steps, 1 or more"
+    DEPTH = "a number of mean diameters, more than 0 and at most 50"
+    SPEED = "a fraction of sqrt(g d), more than 0"
+    LOOKS = "a whole number of looks, 1 or more"
+    TOLERANCE = "two numbers A R, 0 or more and not both 0"
+    CARVE = "two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"
+    VOXEL = "a size in mean diameters, 0.1 to 2"
+    FILE = STEPS + ", and a file name"
+    MESH = "a file name that ends with .vdb, .stl or .vtp"
+    BED = "a file name that ends with .vtp"
+    # words after `solid/cull`: keyword that is named, its value (None: missing), what to give
+    WRONG = {
+        "every 1.5": ("every", "1.5", STEPS), "every 0": ("every", "0", STEPS), "every": ("every", None, STEPS),
+        "depth deep": ("depth", "deep", DEPTH), "depth 0": ("depth", "0", DEPTH), "depth 51": ("depth", "51", DEPTH),
+        "depth": ("depth", None, DEPTH),
+        "exterior sleep": ("exterior", "sleep", "'live'"), "exterior": ("exterior", None, "'live'"),
+        "speed fast": ("speed", "fast", SPEED), "speed -1": ("speed", "-1", SPEED), "speed": ("speed", None, SPEED),
+        "calm 2.5": ("calm", "2.5", LOOKS), "calm 0": ("calm", "0", LOOKS), "calm": ("calm", None, LOOKS),
+        "tolerance x 0": ("tolerance", "x", TOLERANCE), "tolerance 3 -1": ("tolerance", "-1", TOLERANCE),
+        "tolerance 0 0": ("tolerance", "0 0", TOLERANCE), "tolerance 3": ("tolerance", None, TOLERANCE),
+        "carve x 4": ("carve", "x", CARVE), "carve 2 0.5": ("carve", "0.5", CARVE), "carve 2": ("carve", None, CARVE),
+        "motion rigid": ("motion", "rigid", "'fixed'"), "motion": ("motion", None, "'fixed'"),
+        "walls open": ("walls", "open", "'closed' or 'surface'"), "walls": ("walls", None, "'closed' or 'surface'"),
+        "store compact": ("store", "compact", "'exact'"), "store": ("store", None, "'exact'"),
+        "restore refill": ("restore", "refill", "'exact'"), "restore": ("restore", None, "'exact'"),
+        "voxel fine": ("voxel", "fine", VOXEL), "voxel 0.05": ("voxel", "0.05", VOXEL), "voxel": ("voxel", None, VOXEL),
+        "mesh x a.stl": ("mesh", "x", FILE), "mesh 10 a.obj": ("mesh", "a.obj", MESH), "mesh 10": ("mesh", None, MESH),
+        "bed 0 a.vtp": ("bed", "0", FILE), "bed 10 a.stl": ("bed", "a.stl", BED), "bed": ("bed", None, FILE),
+    }
+    KEYWORDS = "bed, calm, carve, depth, every, exterior, mesh, motion, restore, speed, store, tolerance, voxel, walls"
+
+    def test_wrong_type_range_and_missing_values(self):
+        for words, (keyword, value, wanted) in self.WRONG.items():
+            with self.subTest(words):
+                what = "ends too early" if value is None else f"has the value '{value}'"
+                self.refused_by_fix(deck(f"{FIX} {words}", granules=False), f"keyword '{keyword}' {what}: give {wanted}")
+
+    def test_each_keyword_is_tested(self):
+        self.assertEqual(", ".join(sorted({k for k, _, _ in self.WRONG.values()})), self.KEYWORDS)
+
+    def test_unknown_keyword(self):
+        self.refused_by_fix(deck(FIX + " detph 2", granules=False), f"unknown keyword 'detph': choose from {self.KEYWORDS}")
+
+    def test_voxel_too_coarse_for_depth(self):
+        self.refused_by_fix(deck(FIX + " depth 1.5 voxel 2", granules=False),
+                            "voxel 2.0 is too coarse for depth 1.5: choose voxel <= depth/2")
+
+
+class FileRefusals(Case):
+    REASON = "No such file or directory; nothing of the run is lost but it stops here"
+
+    def test_bed_file_in_a_missing_folder(self):
+        self.refused_by_fix(deck(FIX + " bed 10 missing/bed.*.vtp", "run 20"),
+                            f"keyword 'bed': cannot write missing/bed.10.vtp: {self.REASON}")
+
+    def test_mesh_file_in_a_missing_folder(self):
+        for ending in ("stl", "vtp", "vdb"):
+            self.refused_by_fix(deck(f"{FIX} mesh 10 missing/mesh.*.{ending}", "run 20"),
+                                f"keyword 'mesh': cannot write missing/mesh.10.{ending}: {self.REASON}")
+
+    def test_all_ranks_stop_with_one_line(self):
+        run = self.refused_by_fix(deck(FIX + " bed 10 missing/bed.vtp", "run 20"),
+                                  f"keyword 'bed': cannot write missing/bed.vtp: {self.REASON}", ranks=2)
+        self.assertNotIn("Segmentation", run.output)
+
+    def test_files_that_can_be_written_are(self):
+        run = self.accepted(BLOCK + CULL_BLOCK + " bed 100 bed.*.vtp mesh 100 mesh.*.vdb\nrun 200\n")
+        for name in ("bed.100.vtp", "bed.200.vtp", "mesh.100.vdb", "mesh.200.vdb"):
+            self.assertIn(name, run.files)
+        self.assertEqual([f for f in run.files if f.endswith(".part")], [])
+
+
+class RegionRefusals(Case):
+    @staticmethod
+    def line(name):
+        return (f"region interface/mesh: '{name}' is no fix solid/cull: define the fix before the region, and delete the region "
+                "before the fix")
+
+    def test_unknown_fix(self):
+        self.refused(deck(FIX, "region solid interface/mesh cul"), self.line("cul"))
+
+    def test_fix_of_another_style(self):
+        self.refused(deck(FIX, "region solid interface/mesh grav"), self.line("grav"))
+
+    def test_fix_that_was_deleted(self):
+        self.refused(deck(FIX, "region solid interface/mesh cull", "unfix cull", "group inner region solid"), self.line("cull"))
+
+    def test_no_fix_named(self):
+        self.refused(deck(FIX, "region solid interface/mesh"), "region interface/mesh: give the ID of a fix solid/cull")
+
+    def test_reuse_of_a_name(self):
+        self.refused(deck(FIX, "region box interface/mesh cull"), "Reuse of region ID")
+
+    def test_the_region_holds_the_culled_granules(self):
+        run = self.accepted(BLOCK + CULL_BLOCK + "\nregion solid interface/mesh cull\nregion free interface/mesh cull side out\n"
+                            "run 200\ngroup inner region solid\ngroup outer region free\nvariable i equal count(inner)\n"
+                            "variable o equal count(outer)\nvariable s equal f_cull[2]\nvariable a equal atoms\n"
+                            'print "counts ${i} ${o} ${s} ${a}"\n')
+        inner, outer, shell, atoms = map(float, re.search(r"^counts (.*)$", run.log, re.M).group(1).split())
+        self.assertGreater(shell, 0)
+        self.assertEqual(inner, shell)
+        self.assertEqual(inner + outer, atoms)
+
+
+class ContactModelChanges(Case):
+    """Histories are kept as numbers of one contact model."""
+    PLAIN = "gran model hertz tangential no_history"
+
+    def test_restart_with_another_contact_model(self):
+        with tempfile.TemporaryDirectory(prefix="solidcull-") as folder:
+            file = Path(folder) / "stop.restart"
+            self.accepted(BLOCK + f"{CULL_BLOCK}\nrun 200\nwrite_restart {file}\n")
+            head = BLOCK[:BLOCK.index("region box")] + f"read_restart {file}\nneighbor 0.0004 bin\nneigh_modify delay 0\n"
+            rest = MATERIAL + f"pair_style {self.PLAIN}\npair_coeff * *\ntimestep 2e-5\nfix grav all gravity 9.81 vector 0 0 -1\n"
+            self.refused_by_fix(head + rest + f"fix integrate all nve/sphere\n{CULL_BLOCK}\nrun 0\n",
+                                "the restart file holds contact histories of 3 numbers and this deck's contact model has 0: use the "
+                                "contact model that the file was written with")
+
+    def test_another_contact_model_while_granules_are_culled(self):
+        run = Run(BLOCK + f"{CULL_BLOCK}\nrun 200\npair_style {self.PLAIN}\npair_coeff * *\nrun 10\n")
+        self.assertNotEqual(run.status, 0)
+        self.assertEqual(len(run.errors(run.screen)), 1, f"one line must say what is wrong; instead:\n{run.output[-600:]}")
+        self.assertRegex(run.errors(run.screen)[0], "^ERROR: fix cull solid/cull: ")
+
+
+class NoHarm(Case):
+    """A deck that does not ask for the fix runs as if the plug-in were not there."""
+    THERMO = ("compute rot all erotate/sphere\nthermo_style custom step atoms ke c_rot vol\nthermo_modify format float %.17g\n"
+              "thermo 50\nrun 1500\n")
+
+    @unittest.skipUnless(STOCK, "no stock liggghts here")
+    def test_without_the_fix_output_is_the_same_to_the_last_digit(self):
+        text = POUR + self.THERMO
+        stock = self.accepted(text, program=STOCK).thermo()
+        self.assertGreaterEqual(len(stock), 31)
+        self.assertEqual(stock[-1].split()[:2], ["1500", "500"])
+        self.assertRegex(stock[-1].split()[2], r"\d\.\d{14}")
+        self.assertEqual(self.accepted(text).thermo(), stock)
+        self.assertEqual(self.accepted(text, program=STOCK, preload=LIBRARY).thermo(), stock)
+
+    @unittest.skipUnless(STOCK, "no stock liggghts here")
+    def test_the_preloaded_library_runs_a_deck_with_the_fix(self):
+        text = BLOCK + CULL_BLOCK + "\nregion solid interface/mesh cull\nthermo_style custom step atoms ke f_cull[1] f_cull[3]\n" \
+            "thermo_modify format float %.17g\nthermo 50\nrun 400\nunfix cull\nthermo_style custom step atoms ke\nrun 0\n"
+        # the region needs its fix: deleted before it
+        text = text.replace("unfix cull", "region solid delete\nunfix cull")
+        mine = self.accepted(text)
+        self.assertGreater(float(mine.thermo()[-2].split()[4]), 0, "nothing was culled")
+        self.assertEqual(mine.thermo()[-1].split()[1], "343")
+        self.assertEqual(self.accepted(text, program=STOCK, preload=LIBRARY).thermo(), mine.thermo())
+
+    def test_each_run_ends_with_its_sums(self):
+        run = self.accepted(BLOCK + CULL_BLOCK + "\nrun 200\nrun 200\n")
+        sums = re.findall(r"^fix cull solid/cull: \d+ exterior, \d+ interface, \d+ interior granules in \d+ bodies; culled \d+, "
+                          r"restored \d+, carves \d+; mass error \S+ kg, energy added \S+ J$", run.log, re.M)
+        self.assertEqual(len(sums), 2)
+        self.assertEqual(len(re.findall(r"^fix cull solid/cull: \S+ s in the fix since it was made: load ", run.log, re.M)), 2)
+
+
+class CommandPages(unittest.TestCase):
+    HEADINGS = ["Syntax", "Examples", "Description", "Restart and output info", "Restrictions", "Related", "Default"]
+
+    def test_headings_are_lammps_s(self):
+        for page in ("fix_solid_cull", "region_interface_mesh"):
+            text = (ROOT / page / f"{page}.md").read_text()
+            self.assertEqual(re.findall(r"^## (.*)$", text, re.M), self.HEADINGS, page)
+
+    def test_links_lead_somewhere(self):
+        for page in ("fix_solid_cull", "region_interface_mesh"):
+            file = ROOT / page / f"{page}.md"
+            for link in re.findall(r"\]\(([^)#]+)\)", file.read_text()):
+                self.assertTrue((file.parent / link).exists(), f"{page}.md: {link}")
+
+
+if __name__ == "__main__":
+    unittest.main()
