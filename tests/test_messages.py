@@ -26,12 +26,11 @@ fix m4 all property/global coefficientFriction peratomtypepair 1 0.5
 FIX = "fix cull all solid/cull"
 
 
-def deck(*lines, style="granular", newton="off", box="block 0 0.012 0 0.012 -0.001 0.04", pair=HERTZ, granules=True, before=""):
+def deck(*lines, style="granular", newton="off", box="block 0 0.012 0 0.012 -0.001 0.04", pair=HERTZ, granules=True):
     """Granules of 3 mm, one above the other in a small box; `lines` come last."""
     head = f"""\
 atom_style {style}
 atom_modify map array
-{before}
 boundary f f f
 newton {newton}
 communicate single vel yes
@@ -97,9 +96,13 @@ class Run:
                                   stderr=subprocess.STDOUT, check=False)
             self.status = done.returncode
             self.output = done.stdout
-            self.screen = (place / "screen").read_text() if (place / "screen").exists() else ""
-            self.log = (place / "log").read_text() if (place / "log").exists() else ""
+            self.screen, self.log = self.text_of(place / "screen"), self.text_of(place / "log")
             self.files = sorted(p.name for p in place.iterdir())
+
+    @staticmethod
+    def text_of(file):
+        # below one in five errors the stock engine writes a "tip of the day" from memory that it has freed: no UTF-8
+        return file.read_text(errors="replace") if file.exists() else ""
 
     @staticmethod
     def errors(text):
@@ -144,10 +147,6 @@ class DeckRefusals(Case):
             self.refused_by_fix(deck(FIX, style=style, granules=False),
                                 f"atom style '{style}' has no granules: use atom_style granular")
 
-    def test_atoms_without_tags(self):
-        self.refused_by_fix(deck(FIX, granules=False, before="atom_modify id no"),
-                            "atoms have no tags: put 'atom_modify id yes' into the deck")
-
     def test_triclinic_box(self):
         self.refused_by_fix(deck(FIX, granules=False, box="prism 0 0.02 0 0.02 0 0.04 0.002 0 0"),
                             "the box is triclinic: use an orthogonal one")
@@ -161,7 +160,8 @@ class DeckRefusals(Case):
         self.refused_by_fix(deck(*groups, FIX), "all 32 groups are taken and interface granules need one: delete a group")
 
     def test_pair_style_not_granular(self):
-        self.refused_by_fix(deck(FIX, "run 0", pair="soft 0.003"), "pair_style 'soft' is not granular: use pair_style gran")
+        self.refused_by_fix(deck(FIX, "run 0", pair="soft 0.003").replace("pair_coeff * *", "pair_coeff * * 1.0"),
+                            "pair_style 'soft' is not granular: use pair_style gran")
 
     def test_no_pair_style(self):
         self.refused_by_fix(deck(FIX, "run 0", pair="none").replace("pair_coeff * *\n", ""),
@@ -194,7 +194,7 @@ class MissedPhysics(Case):
         self.missed(["fix cfd all couple/cfd couple_every 10 file ./"], "cfd couple/cfd", "CFD coupling would miss the culled granules")
 
     def test_sph(self):
-        self.missed(["fix sph all sph/density/continuity"], "sph sph/density/continuity", "SPH would miss the culled granules")
+        self.missed(["fix sph all sph/density/continuity sphkernel cubicspline"], "sph sph/density/continuity", "SPH would miss the culled granules")
 
     def test_growing_radii(self):
         self.missed(["variable d equal 0.003", "fix grow all adapt 1 atom diameter v_d"],

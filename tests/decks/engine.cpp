@@ -13,6 +13,7 @@
 #include "fix.h"
 #include "fix_contact_history.h"
 #include "fix_contact_history_mesh.h"
+#include "group.h"
 #include "input.h"
 #include "lammps.h"
 #include "modify.h"
@@ -82,6 +83,8 @@ void Engine::run(const std::string& deck) {
   for (std::string line; std::getline(lines, line);)
     if (!line.empty()) lmp_->input->one(line.c_str());
 }
+
+int Engine::group_bit(const std::string& name) const { return lmp_->group->bitmask[lmp_->group->find(name.c_str())]; }
 
 int Engine::rank() const { return lmp_->comm->me; }
 int Engine::ranks() const { return lmp_->comm->nprocs; }

@@ -39,6 +39,7 @@ class Engine {
   Histories histories();              ///< granule-granule and granule-mesh
   double vector(const std::string& fix, int n);  ///< f_ID[n], n from 1; n = 0: f_ID
   double variable(const std::string& name);      ///< an equal-style variable
+  int group_bit(const std::string& name) const;
   int rank() const;
   int ranks() const;
   LAMMPS_NS::LAMMPS* lammps() { return lmp_; }

@@ -161,6 +161,109 @@ TEST(Scenes, ASlowAndAFastRampWakeAtTheSameLoad) {
   if (rank == 0) std::printf("first wake-up at +%.5g N (10 x slower: +%.5g N, 10 x faster: +%.5g N)\n", middle, slow, fast);
 }
 
+double distance(const Vec& a, const Vec& b) { return std::sqrt(std::pow(a[0] - b[0], 2) + std::pow(a[1] - b[1], 2) + std::pow(a[2] - b[2], 2)); }
+
+TEST(Scenes, ABlowOfGivenExcessCarvesTheBallsOfTheLaw) {
+  Bed bed;
+  bed.name = "carve";
+  bed.side = 0.034;
+  bed.granules = 2600;
+  Engine e;
+  e.run(read_bed(bed) + "run 50\n");
+  const State whole = e.state();
+  double mean_diameter = 0;
+  for (const auto& g : whole) mean_diameter += 2 * g.second.radius / static_cast<double>(whole.size());
+  e.run("fix cull all solid/cull every 50 calm 2 depth 1.5 tolerance 3 0 carve 1.5 4\nrun 300\n");
+  ASSERT_EQ(f(e, 8), 0);
+  const int bit = e.group_bit("cull_interface");
+  const State before = e.state();
+
+  // two interface granules away from walls, their balls overlapping: struck with 2 and 4 times the tolerance
+  std::vector<int> struck;
+  for (const Vec& aim : {Vec{0.014, 0.017, 0.03}, Vec{0.019, 0.017, 0.03}}) {
+    int best = 0;
+    for (const auto& g : before)
+      if ((g.second.mask & bit) && (struck.empty() || g.first != struck[0]) &&
+          (!best || distance(g.second.x, aim) < distance(before.at(best).x, aim)))
+        best = g.first;
+    struck.push_back(best);
+  }
+  const double excess[2] = {2, 4};
+  std::string hits;
+  for (int k = 0; k < 2; ++k) {
+    const std::string name = "hit" + std::to_string(k);
+    char force[64];
+    std::snprintf(force, sizeof force, "%.17g", -excess[k] * 3 * before.at(struck[k]).mass * 9.81);
+    hits += "group " + name + " id " + std::to_string(struck[k]) + "\nfix " + name + " " + name + " addforce 0 0 " + force + "\n";
+  }
+  e.run(hits + "run 0\n");
+  for (int k = 0; k < 30 && f(e, 8) == 0; ++k) e.run("run 1 pre no post no\n");
+  ASSERT_EQ(f(e, 8), 2) << "two carves, of one step together";
+
+  const State after = e.state();
+  int carved = 0;
+  for (const auto& g : whole) {
+    const bool was_exterior = before.count(g.first) && !(before.at(g.first).mask & bit);
+    const bool is_exterior = after.count(g.first) && !(after.at(g.first).mask & bit);
+    bool in_a_ball = false, at_a_rim = false;
+    for (int k = 0; k < 2; ++k) {
+      const double radius = 1.5 * mean_diameter * (1 + 0.5 * std::log2(excess[k]));
+      const double d = distance(g.second.x, before.at(struck[k]).x);
+      in_a_ball = in_a_ball || d <= radius;
+      at_a_rim = at_a_rim || std::abs(d - radius) < 0.02 * mean_diameter;  // a struck granule's load trembles by a few per cent
+    }
+    if (at_a_rim) continue;
+    EXPECT_EQ(is_exterior, was_exterior || in_a_ball) << "granule " << g.first;
+    carved += is_exterior && !was_exterior;
+    // the hole is lined: whatever an exterior granule could touch is an atom (I1)
+    for (const auto& other : whole) {
+      const bool touches = distance(g.second.x, other.second.x) < g.second.radius + other.second.radius;
+      EXPECT_TRUE(!is_exterior || !touches || after.count(other.first)) << g.first << " and " << other.first;
+    }
+  }
+  EXPECT_GT(carved, 20);
+  if (e.rank() == 0) std::printf("two blows freed %d granules; %g carves\n", carved, f(e, 8));
+}
+
+TEST(Scenes, TheRegionHoldsTheBodiesAndNothingElse) {
+  const Bed bed = mesh_bed("region");
+  Engine e;
+  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.5\nrun 500\nrun 0\nregion solid interface/mesh cull\n"
+        "region rest interface/mesh cull side out\ngroup held region solid\nvariable held equal count(held)\n"
+        "variable both equal count(all,solid)+count(all,rest)\nvariable one atom 1\ncompute inside all reduce/region solid sum v_one\n"
+        "variable inside equal c_inside\nthermo_style custom step atoms c_inside\nrun 0\n");
+  EXPECT_EQ(e.variable("both"), f(e, 1) + f(e, 2));
+  EXPECT_EQ(e.variable("held"), e.variable("inside"));
+  // the interface granules and no other; at rough places of the surface an exterior centre may lie within half a voxel
+  EXPECT_NEAR(e.variable("held"), f(e, 2), 0.02 * f(e, 2));
+  e.run("thermo_style custom step atoms\nuncompute inside\nregion solid delete\nregion rest delete\nunfix cull\nrun 0\n");
+}
+
+TEST(Scenes, GravityThatTurnsWakesEverything) {
+  Bed bed;
+  bed.name = "gravity";
+  Engine e;
+  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.5\nrun 500\n");
+  ASSERT_GT(f(e, 3), 100);
+  e.run("unfix grav\nfix grav all gravity 9.81 vector 0.2 0 -1\nrun 30\n");
+  EXPECT_EQ(f(e, 3), 0);
+  EXPECT_EQ(f(e, 2), 0);
+}
+
+TEST(Scenes, AWallThatGoesWakesWhatTouchedIt) {
+  Bed bed;
+  bed.name = "wall";
+  Engine e;
+  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.5\nrun 500\n");
+  const double before = f(e, 3);
+  ASSERT_GT(before, 100);
+  e.run("unfix x2\nrun 500\n");
+  EXPECT_GT(f(e, 7), 100) << "restored";
+  double farthest = 0;
+  for (const auto& g : e.state()) farthest = std::max(farthest, g.second.x[0]);
+  EXPECT_GT(farthest, bed.side) << "nothing flows out";
+}
+
 TEST(Scenes, GranulesLeaveByTheStoreAndComeBackWithTheirIds) {
   const Bed bed = mesh_bed("ids");
   Engine e;
