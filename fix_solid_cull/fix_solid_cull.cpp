@@ -71,7 +71,7 @@ FixSolidCull::FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
   if (force->newton_pair) refuse("newton is on: put 'newton off' at the top of the deck");
   if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->sphere_flag)
     refuse("atom style '" + std::string(atom->atom_style) + "' has no granules: use atom_style granular");
-  if (!atom->tag_enable) refuse("atoms have no tags: put 'atom_modify id yes' into the deck");
+  if (!atom->tag_enable) refuse("atoms have no tags: use an atom style that has them, as granular does");
   for (int f = 0; f < modify->nfix; ++f)
     if (modify->fix[f] && std::strcmp(modify->fix[f]->style, style) == 0 && std::strcmp(modify->fix[f]->id, id) != 0)
       refuse("fix " + std::string(modify->fix[f]->id) + " is a solid/cull already: give one fix a group that holds all granules");
@@ -130,6 +130,8 @@ void FixSolidCull::refuse(const std::string& why) {
 void FixSolidCull::broken(const std::string& what) {
   const std::string line = "fix " + std::string(id) + " solid/cull: internal error on rank " + std::to_string(comm->me) + " at step " +
                            std::to_string(update->ntimestep) + ": " + what + "; please report it with the deck";
+  std::fprintf(stderr, "ERROR: %s\n", line.c_str());  // MPI_Abort drops what is buffered
+  std::fflush(nullptr);
   error->one(__FILE__, __LINE__, line.c_str());
 }
 
@@ -176,7 +178,7 @@ void FixSolidCull::refuse_what_cannot_be_culled() {
   // physics that culled granules would miss; the styles are prefixes
   static const Physics missed[] = {
       {"heat/gran", "heat conduction would miss the culled granules"},
-      {"couple/cfd", "CFD coupling would miss the culled granules"},
+      {"couple/", "a coupled solver would miss the culled granules"},
       {"sph/", "SPH would miss the culled granules"},
       {"adapt", "radii that change (fix adapt) would leave the culled granules behind"},
       {"multisphere", "multisphere clumps are not supported yet"},
@@ -254,7 +256,11 @@ void FixSolidCull::init() {
   refuse_what_cannot_be_culled();
   histories_.connect();
   walls_.connect();
-  contacts_.set_layout(histories_.flips());
+  const std::vector<bool> flips = histories_.flips();
+  if (contacts_.size() > 0 && flips != contacts_.layout())
+    refuse("the contact model's history has changed from " + std::to_string(contacts_.width()) + " to " + std::to_string(flips.size()) +
+           " numbers while granules are culled: unfix " + id + " before the pair_style changes");
+  contacts_.set_layout(flips);
   halo_.update();
   new_run_ = true;
 }

@@ -106,11 +106,11 @@ void FixSolidCull::change_membership() {
       if (mesh != meshes_.end()) mesh->second.carve({balls_[cut.second].centre, balls_[cut.second].radius});
     }
     thaw_contacts();
-    const std::vector<int> born = bodies_.split(contacts_, [&](std::int64_t tag) { return mass_of(tag); });
+    bodies_.split(contacts_, [&](std::int64_t tag) { return mass_of(tag); });
     freeze_contacts();
     for (const std::int64_t tag : locked_now_) bodies_.lock(tag, mass_of(tag), contacts_);
     if (meshes_wanted_) {
-      for (const int body : born) meshes_.erase(body);
+      for (const int body : bodies_.split_parents()) meshes_.erase(body);  // made anew from what is left, as is what came off
       update_meshes();
     }
     store_what_is_deep();

@@ -8,6 +8,11 @@ namespace solidcull {
 void FrozenContacts::set_layout(std::vector<bool> flips) {
   if (count_ != 0 && flips != flips_)
     throw std::logic_error("the contact history's layout changed while contacts are frozen");
+  if (flips != flips_) {
+    edges_.clear();
+    histories_.clear();
+    free_.clear();
+  }
   flips_ = std::move(flips);
 }
 
@@ -37,6 +42,7 @@ void FrozenContacts::write(int e, std::int64_t tag, const double* history) {
 }
 
 void FrozenContacts::add(std::int64_t tag, std::int64_t partner, const double* history) {
+  if (tag == partner) return;  // a granule that touches its own periodic image: no partner to freeze it with
   int e = find(tag, partner);
   if (e == none) {
     if (free_.empty()) {

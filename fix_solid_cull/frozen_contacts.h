@@ -16,6 +16,7 @@ class FrozenContacts {
  public:
   /// flips: one entry per history component, true for vector-like ones (the engine's "newton" flag of that component).
   void set_layout(std::vector<bool> flips);
+  const std::vector<bool>& layout() const { return flips_; }
   std::size_t width() const { return flips_.size(); }
 
   /// Adds the contact of `tag` with `partner`, history as `tag` sees it (`width()` numbers, or nullptr: touching without history).

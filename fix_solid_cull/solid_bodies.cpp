@@ -84,6 +84,7 @@ std::vector<int> SolidBodies::split(const FrozenContacts& contacts, const MassOf
     if (const int body = body_of(tag)) sources[body].push_back(tag);
   cut_.clear();
 
+  split_parents_.clear();
   std::vector<int> born;
   for (auto& [body, tags] : sources) {
     std::sort(tags.begin(), tags.end());
@@ -146,6 +147,7 @@ std::vector<int> SolidBodies::split(const FrozenContacts& contacts, const MassOf
       bodies_[body].add(part, -1);
       bodies_[fresh] = part;
       born.push_back(fresh);
+      split_parents_.push_back(body);
     }
   }
   return born;

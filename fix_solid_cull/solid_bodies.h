@@ -50,6 +50,9 @@ class SolidBodies {
   /// stops when one search is left, so its cost goes with the smaller parts. Returns the numbers of the new bodies.
   std::vector<int> split(const FrozenContacts& contacts, const MassOf& mass_of);
 
+  /// Bodies that lost a part in the last split().
+  const std::vector<int>& split_parents() const { return split_parents_; }
+
   int body_of(std::int64_t tag) const;                 ///< 0 if not locked on this rank
   const MassProperties& properties(int body) const { return bodies_.at(body); }
   const std::map<int, MassProperties>& bodies() const { return bodies_; }
@@ -72,6 +75,7 @@ class SolidBodies {
   std::map<int, MassProperties> bodies_;   // living bodies only
   std::vector<std::int64_t> cut_;          // locked neighbours of unlocked granules
   std::vector<std::pair<int, int>> merges_;
+  std::vector<int> split_parents_;
 };
 
 }  // namespace solidcull

@@ -22,7 +22,7 @@ struct SolidStateLaw {
   double gravity;                   ///< |g| in m/s^2
   int looks;                        ///< looks in a row
   static constexpr double gap = 0.01;                 ///< touching within this share of the radii's sum counts as contact
-  static constexpr double out_of_balance_share = 0.5; ///< of the wake-up tolerance A
+  static constexpr double out_of_balance_share = 0.25; ///< of the wake-up tolerance A
 
   bool quiet_contact(const MovingSphere& a, const MovingSphere& b) const {
     return contact_velocity(a, b).squaredNorm() < speed * speed;

@@ -58,7 +58,7 @@ class SphereCells {
     const Vec3 reach = Vec3::Constant(s.radius + gap + largest_);
     return !for_each_in_box(s.centre - reach, s.centre + reach, [&](std::size_t, const Sphere& other) {
       const double touch = s.radius + other.radius + gap;
-      return (other.centre - s.centre).squaredNorm() >= touch * touch;
+      return touch <= 0 || (other.centre - s.centre).squaredNorm() >= touch * touch;
     });
   }
 
