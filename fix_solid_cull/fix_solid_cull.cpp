@@ -272,6 +272,10 @@ double FixSolidCull::max_rad(int type) {
 void FixSolidCull::setup_pre_exchange() {
   find_scales();
   if (!store_) return;
+  // a restart file keeps groups: marks of granules that this fix does not hold would hide their contacts
+  const int bit = group->bitmask[interface_group_];
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (!shell_[i].locked) atom->mask[i] &= ~bit;
   if (!restart_state_.empty()) take_up_restart_state();
   open_for_insertion();
   change_membership();
@@ -297,7 +301,8 @@ void FixSolidCull::pre_initial_integrate() {
   see_walls();
   wake_where_walls_are_gone();
   if (any_rank(!waking_.empty())) next_reneighbor = update->ntimestep;
-  if (next_look_ < update->ntimestep) next_look_ = ((update->ntimestep - 1) / look_every_ + 1) * look_every_;
+  const std::int64_t interval = static_cast<std::int64_t>(look_every_) * look_factor_;
+  next_look_ = ((update->ntimestep - 1) / interval + 1) * interval;
 }
 
 // ------------------------------------------------------------------------------------------------------------ the time step

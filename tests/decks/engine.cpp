@@ -159,8 +159,9 @@ double largest(const State& a, Vec Granule::*what) {
   return most;
 }
 
-std::string head(const Bed&) {
-  return "atom_style granular\natom_modify map array\nboundary f f f\nnewton off\ncommunicate single vel yes\nunits si\n"
+std::string head(const Bed& bed) {
+  return std::string("atom_style granular\natom_modify map array\nboundary ") + (bed.periodic ? "p p f" : "f f f") +
+         "\nnewton off\ncommunicate single vel yes\nunits si\n"
          "processors * * 1\n";
 }
 
@@ -177,6 +178,7 @@ std::string body(const Bed& bed) {
   s << "pair_style gran " << bed.contact << "\npair_coeff * *\ntimestep " << bed.dt << "\nfix grav all gravity 9.81 vector 0 0 -1\n";
   const std::string wall = " all wall/gran " + bed.contact;
   for (const char* dim : {"x", "y"}) {
+    if (bed.periodic) break;
     if (!(bed.mesh_walls && dim[0] == 'x')) s << "fix " << dim << "1" << wall << " primitive type 1 " << dim << "plane 0\n";
     s << "fix " << dim << "2" << wall << " primitive type 1 " << dim << "plane " << bed.side << "\n";
   }
@@ -202,7 +204,8 @@ std::string settled(const Bed& bed) {
   MPI_Barrier(MPI_COMM_WORLD);
   const auto steps = [&](double at_3e5) { return static_cast<int>(std::lround(at_3e5 * 3e-5 / bed.dt)); };
   std::ostringstream s;
-  s << head(bed) << "region reg block -0.002 " << bed.side + 0.002 << " -0.002 " << bed.side + 0.002 << " -0.002 0.15\n"
+  const double rim = bed.periodic ? 0 : 0.002;
+  s << head(bed) << "region reg block " << -rim << ' ' << bed.side + rim << ' ' << -rim << ' ' << bed.side + rim << " -0.002 0.15\n"
     << "create_box 2 reg\nneighbor 0.0006 bin\nneigh_modify delay 0\n"
     << body(bed)
     << "fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0012\n"

@@ -57,6 +57,7 @@ struct Bed {
   std::string contact = "model hertz tangential history rolling_friction epsd2";
   bool mesh_walls = false;
   bool cohesion = false;
+  bool periodic = false;  // in x and y, instead of side walls
   int granules = 1300;
   double side = 0.026;    // m, square base
   double dt = 3e-5;       // s
