@@ -32,6 +32,8 @@ namespace {
 constexpr int wake_together = 10;
 // pores of a packing hold no ball of this radius (in mean diameters); a hole that holds one is open to the outside
 constexpr double closing_diameters = 0.6;
+// in a run that starts with an empty box, steps between two tries to find granules to take the scales from
+constexpr int first_granules_every = 50;
 constexpr double standard_gravity = 9.81;  // m/s^2, the scale where the deck has none
 
 Vec3 vec(const double* v) { return Vec3(v[0], v[1], v[2]); }
@@ -271,7 +273,10 @@ double FixSolidCull::max_rad(int type) {
 
 void FixSolidCull::setup_pre_exchange() {
   find_scales();
-  if (!store_) return;
+  if (!store_) {
+    new_run_ = false;
+    return;
+  }
   // a restart file keeps groups: marks of granules that this fix does not hold would hide their contacts
   const int bit = group->bitmask[interface_group_];
   for (int i = 0; i < atom->nlocal; ++i)
@@ -458,7 +463,11 @@ void FixSolidCull::ask_for_reneighbouring_if_waking() {
 }
 
 void FixSolidCull::pre_final_integrate() {
-  if (!store_) return;
+  if (!store_) {  // the run started with an empty box: the first granules that are poured set the scales
+    if (update->ntimestep % first_granules_every == 0) find_scales();
+    if (!store_) return;
+    next_look_ = update->ntimestep + look_every_;
+  }
   take_loads();
   ask_for_reneighbouring_if_waking();
   if (update->ntimestep == next_look_) {

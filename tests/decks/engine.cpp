@@ -192,6 +192,22 @@ std::string body(const Bed& bed) {
   return s.str();
 }
 
+std::string pouring(const Bed& bed) {
+  std::ostringstream s;
+  const double rim = bed.periodic ? 0 : 0.002;
+  s << head(bed) << "region reg block " << -rim << ' ' << bed.side + rim << ' ' << -rim << ' ' << bed.side + rim << " -0.002 0.15\n"
+    << "create_box 2 reg\nneighbor 0.0006 bin\nneigh_modify delay 0\n"
+    << body(bed)
+    << "fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0012\n"
+       "fix t2 all particletemplate/sphere 15485867 atom_type 2 density constant 2500 radius constant 0.0014\n"
+       "fix dist all particledistribution/discrete 32452843 2 t1 0.5 t2 0.5\n"
+    << "region pour block 0 " << bed.side << " 0 " << bed.side << " 0.001 0.1\n"
+    << "fix ins all insert/pack seed 32452867 distributiontemplate dist maxattempt 200 insert_every once overlapcheck yes all_in "
+       "yes vel constant 0 0 -0.3 region pour particles_in_region "
+    << bed.granules << "\nfix integr all nve/sphere\nthermo 100000\nthermo_modify norm no\n";
+  return s.str();
+}
+
 std::string settled(const Bed& bed) {
   static std::set<std::string> made;
   const std::string file = "bed_" + bed.name + ".restart";
@@ -204,17 +220,7 @@ std::string settled(const Bed& bed) {
   MPI_Barrier(MPI_COMM_WORLD);
   const auto steps = [&](double at_3e5) { return static_cast<int>(std::lround(at_3e5 * 3e-5 / bed.dt)); };
   std::ostringstream s;
-  const double rim = bed.periodic ? 0 : 0.002;
-  s << head(bed) << "region reg block " << -rim << ' ' << bed.side + rim << ' ' << -rim << ' ' << bed.side + rim << " -0.002 0.15\n"
-    << "create_box 2 reg\nneighbor 0.0006 bin\nneigh_modify delay 0\n"
-    << body(bed)
-    << "fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0012\n"
-       "fix t2 all particletemplate/sphere 15485867 atom_type 2 density constant 2500 radius constant 0.0014\n"
-       "fix dist all particledistribution/discrete 32452843 2 t1 0.5 t2 0.5\n"
-    << "region pour block 0 " << bed.side << " 0 " << bed.side << " 0.001 0.1\n"
-    << "fix ins all insert/pack seed 32452867 distributiontemplate dist maxattempt 200 insert_every once overlapcheck yes all_in "
-       "yes vel constant 0 0 -0.3 region pour particles_in_region "
-    << bed.granules << "\nfix integr all nve/sphere\nthermo 100000\nthermo_modify norm no\nrun " << steps(4000) << "\nunfix ins\n"
+  s << pouring(bed) << "run " << steps(4000) << "\nunfix ins\n"
     << "fix visc all viscous 0.002\nrun " << steps(6000) << "\n";
   // spin about a lone contact has no damping in most models: stopped by hand, until the bed is at rest
   for (int k = 0; k < 8; ++k) s << "set group all omegax 0 omegay 0 omegaz 0\nvelocity all set 0 0 0\nrun " << steps(700) << "\n";

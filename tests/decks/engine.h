@@ -67,6 +67,8 @@ struct Bed {
 std::string head(const Bed& bed);                         ///< up to the box
 std::string body(const Bed& bed);                         ///< material, walls, gravity
 std::string read_bed(const Bed& bed);                     ///< reads the settled bed (made once, see settled())
+/// A deck up to the first run of a pour into an empty box.
+std::string pouring(const Bed& bed);
 /// Pours and settles the bed once for all tests of a process and returns the restart file's name. Collective.
 std::string settled(const Bed& bed);
 

@@ -264,6 +264,15 @@ TEST(Scenes, AWallThatGoesWakesWhatTouchedIt) {
   EXPECT_GT(farthest, bed.side) << "nothing flows out";
 }
 
+TEST(Scenes, ARunThatStartsWithAnEmptyBoxIsCulledToo) {
+  Bed bed;
+  bed.name = "pour";
+  Engine e;
+  e.run(pouring(bed) + "fix cull all solid/cull\nfix visc all viscous 0.002\nrun 12000\n");
+  EXPECT_EQ(f(e, 1) + f(e, 2) + f(e, 3), bed.granules);
+  EXPECT_GT(f(e, 3), 50);
+}
+
 TEST(Scenes, GranulesLeaveByTheStoreAndComeBackWithTheirIds) {
   const Bed bed = mesh_bed("ids");
   Engine e;
