@@ -12,6 +12,8 @@
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
+#include "engine_access.h"
+#include "engine_vectors.h"
 #include "error.h"
 #include "fix_gravity.h"
 #include "fix_insert.h"
@@ -36,8 +38,6 @@ constexpr double closing_diameters = 0.6;
 constexpr int first_granules_every = 50;
 constexpr double standard_gravity = 9.81;  // m/s^2, the scale where the deck has none
 
-Vec3 vec(const double* v) { return Vec3(v[0], v[1], v[2]); }
-void clear(double* to) { to[0] = to[1] = to[2] = 0; }
 
 /// Invariants are checked at every reneighbouring in debug builds, and in any build when SOLIDCULL_CHECK is in the environment.
 bool checking() {
@@ -417,8 +417,8 @@ void FixSolidCull::take_loads() {
     const double square = e.load_change.squaredNorm();
     if (square > e.excess * e.excess * tolerance * tolerance) e.excess = std::sqrt(square) / tolerance;
     largest_excess_ = std::max(largest_excess_, e.excess);
-    clear(force[i]);
-    clear(atom->torque[i]);
+    set(force[i], Vec3::Zero());
+    set(atom->torque[i], Vec3::Zero());
   }
 }
 

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "contact_histories.h"
-#include "engine_access.h"
 #include "fix.h"
 #include "flat_map.h"
 #include "frozen_contacts.h"
@@ -206,7 +205,6 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   bool lists_are_new_ = false;
   bool thawed_ = false;
   bool after_setup_ = false;
-  bool walls_may_have_changed_ = false;
   bool new_run_ = false;
   int interface_group_ = -1;
   int look_factor_ = 1;             // looks less often where nothing can be culled

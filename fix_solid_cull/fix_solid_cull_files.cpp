@@ -6,17 +6,12 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "engine_vectors.h"
 #include "fix_solid_cull.h"
 #include "mesh_files.h"
 #include "update.h"
 
 namespace solidcull {
-namespace {
-
-Vec3 vec(const double* v) { return Vec3(v[0], v[1], v[2]); }
-
-}  // namespace
-
 const std::map<int, InterfaceMesh>& FixSolidCull::interface_meshes() {
   const auto timed = watch_.time(Part::mesh);
   if (!meshes_wanted_ && store_) {

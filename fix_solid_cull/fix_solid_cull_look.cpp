@@ -6,6 +6,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "engine_vectors.h"
 #include "fix_solid_cull.h"
 #include "force.h"
 #include "group.h"
@@ -30,7 +31,6 @@ constexpr int longest_wait = 10;
 // where looks find nothing, they come up to this many times more seldom
 constexpr int largest_look_factor = 16;
 
-Vec3 vec(const double* v) { return Vec3(v[0], v[1], v[2]); }
 
 }  // namespace
 

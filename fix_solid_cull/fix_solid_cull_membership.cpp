@@ -9,6 +9,8 @@
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
+#include "engine_access.h"
+#include "engine_vectors.h"
 #include "fix_insert.h"
 #include "fix_solid_cull.h"
 #include "group.h"
@@ -26,10 +28,6 @@ constexpr double store_gap_in_skins = 2.5;
 // after this share of the atoms came or went, the engine sorts its arrays at once
 constexpr double sort_share = 0.05;
 
-Vec3 vec(const double* v) { return Vec3(v[0], v[1], v[2]); }
-void set(double* to, const Vec3& v) {
-  for (int d = 0; d < 3; ++d) to[d] = v[d];
-}
 double kinetic_energy(double mass, double radius, const Vec3& v, const Vec3& spin) {
   return 0.5 * mass * v.squaredNorm() + 0.2 * mass * radius * radius * spin.squaredNorm();
 }

@@ -124,12 +124,4 @@ std::vector<WallContacts::Box> WallContacts::boxes(bool moving_only) const {
 std::vector<WallContacts::Box> WallContacts::moving_triangle_boxes() const { return boxes(true); }
 std::vector<WallContacts::Box> WallContacts::triangle_boxes() const { return boxes(false); }
 
-bool WallContacts::any_moving_mesh() const {
-  for (FixWallGran* wall : walls_)
-    if (wall->is_mesh_wall())
-      for (int m = 0; m < wall->n_meshes(); ++m)
-        if (wall->mesh_list()[m]->triMesh()->isMoving()) return true;
-  return false;
-}
-
 }  // namespace solidcull

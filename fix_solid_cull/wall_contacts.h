@@ -45,7 +45,6 @@ class WallContacts : protected LAMMPS_NS::Pointers {
   /// Boxes around all triangles of the meshes on this rank.
   std::vector<Box> triangle_boxes() const;
   bool primitive_near(const Sphere& s, double gap) const;
-  bool any_moving_mesh() const;
 
  private:
   std::vector<Box> boxes(bool moving_only) const;
