@@ -61,8 +61,8 @@ class Picture:
     def window(self, low, high):
         """Pixel ranges and pixel centres of a box, clipped to the picture."""
         h, w = self.depth.shape
-        x0, x1 = max(int(low[0]), 0), min(int(high[0]) + 1, w)
-        y0, y1 = max(int(low[1]), 0), min(int(high[1]) + 1, h)
+        x0, y0 = max(int(low[0]), 0), max(int(low[1]), 0)
+        x1, y1 = max(min(int(high[0]) + 1, w), x0), max(min(int(high[1]) + 1, h), y0)  # empty where the box lies outside
         return (slice(y0, y1), slice(x0, x1)), np.arange(x0, x1) + 0.5, np.arange(y0, y1)[:, None] + 0.5
 
     def put(self, box, mask, depth, shade, colour):

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <string>
 
 #include "atom.h"
 #include "engine_access.h"
@@ -20,6 +21,29 @@ std::vector<bool> ContactHistories::flips() const {
   const int* newton = engine::history_newton_flags(*fix_);
   for (int d = 0; d < fix_->get_dnum(); ++d) f.push_back(newton[d] != 0);
   return f;
+}
+
+std::vector<int> ContactHistories::vectors() const {
+  std::vector<int> firsts;
+  if (!fix_) return firsts;
+  const int width = fix_->get_dnum();
+  for (int d = 0; d + 2 < width; ++d) {
+    const std::string name = engine::history_name(*fix_, d);
+    for (const char* ends : {"xyz", "012"}) {
+      // epsd and epsd2 say "r_torquex_old"
+      const std::size_t at = name.find_last_of(ends[0]);
+      if (at == std::string::npos) continue;
+      std::string second = name, third = name;
+      second[at] = ends[1];
+      third[at] = ends[2];
+      const std::string after = engine::history_name(*fix_, d + 2);
+      if (engine::history_name(*fix_, d + 1) != second || (after != third && after != second)) continue;  // luding says y twice
+      firsts.push_back(d);
+      d += 2;
+      break;
+    }
+  }
+  return firsts;
 }
 
 void ContactHistories::bring_up_to_date() {

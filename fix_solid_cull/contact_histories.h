@@ -22,6 +22,9 @@ class ContactHistories : protected LAMMPS_NS::Pointers {
   void connect();
   /// One entry per history number: does it change sign with the side it is seen from? Empty without histories.
   std::vector<bool> flips() const;
+  /// Which history numbers are vectors of space: the first of each three. By the engine's names for them: ...x, ...y, ...z or
+  /// ..._0, ..._1, ..._2.
+  std::vector<int> vectors() const;
   /// Outside of a time step: have the engine fill the partner lists from its neighbour lists if those are newer.
   void bring_up_to_date();
 

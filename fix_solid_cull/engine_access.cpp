@@ -26,6 +26,7 @@ struct Expose {
 using FixStyles = std::map<std::string, FixCreator>;
 SOLIDCULL_EXPOSE(ModifyFixMap, Modify, FixStyles*, fix_map)
 SOLIDCULL_EXPOSE(HistoryNewton, FixContactHistory, int*, newtonflag_)
+SOLIDCULL_EXPOSE(HistoryNames, FixContactHistory, char**, history_id_)
 SOLIDCULL_EXPOSE(InsertCompress, FixInsert, bool, compress_flag)
 SOLIDCULL_EXPOSE(PackRegion, FixInsertPack, LAMMPS_NS::Region*, ins_region)
 SOLIDCULL_EXPOSE(ThermoAtoms, Thermo, LAMMPS_NS::bigint, last_natoms)
@@ -35,8 +36,9 @@ std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify) { retur
 
 const int* history_newton_flags(const LAMMPS_NS::FixContactHistory& fix) { return fix.*member(HistoryNewton()); }
 
-bool compresses_tags(const LAMMPS_NS::FixInsert& fix) { return fix.*member(InsertCompress()); }
+const char* history_name(const LAMMPS_NS::FixContactHistory& fix, int number) { return (fix.*member(HistoryNames()))[number]; }
 
+bool compresses_tags(const LAMMPS_NS::FixInsert& fix) { return fix.*member(InsertCompress()); }
 
 void expect_atoms(LAMMPS_NS::Thermo& thermo, long change) { thermo.*member(ThermoAtoms()) += change; }
 

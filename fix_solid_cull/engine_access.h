@@ -24,6 +24,9 @@ std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify);
 /// Per history number: 1 if it changes sign with the side it is seen from.
 const int* history_newton_flags(const LAMMPS_NS::FixContactHistory& fix);
 
+/// The engine's name for a history number.
+const char* history_name(const LAMMPS_NS::FixContactHistory& fix, int number);
+
 /// Whether the fix renumbers all granules when it inserts (compress_tags).
 bool compresses_tags(const LAMMPS_NS::FixInsert& fix);
 /// Thermo output stops the run when it counts fewer atoms than the time before ("Lost atoms"): tells it of atoms that went into

@@ -32,6 +32,8 @@ namespace {
 
 // waking granules are handled together after so many steps: a sound wave crosses one granule in about that time
 constexpr int wake_together = 10;
+// but a load change of so many tolerances at once
+constexpr double blow = 2;
 // pores of a packing hold no ball of this radius (in mean diameters); a hole that holds one is open to the outside
 constexpr double closing_diameters = 0.6;
 // in a run that starts with an empty box, steps between two tries to find granules to take the scales from
@@ -80,7 +82,7 @@ FixSolidCull::FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
 
   scalar_flag = 1;
   vector_flag = 1;
-  size_vector = 12;
+  size_vector = counts + 10;
   global_freq = 1;
   extscalar = 1;
   extvector = 0;
@@ -121,7 +123,8 @@ FixSolidCull::~FixSolidCull() {
 
 int FixSolidCull::setmask() {
   using namespace LAMMPS_NS::FixConst;
-  return PRE_INITIAL_INTEGRATE | PRE_EXCHANGE | PRE_NEIGHBOR | PRE_FORCE | PRE_FINAL_INTEGRATE | END_OF_STEP;
+  return PRE_INITIAL_INTEGRATE | POST_INTEGRATE | PRE_EXCHANGE | PRE_NEIGHBOR | PRE_FORCE | PRE_FINAL_INTEGRATE | FINAL_INTEGRATE |
+         END_OF_STEP;
 }
 
 void FixSolidCull::refuse(const std::string& why) {
@@ -249,9 +252,33 @@ void FixSolidCull::find_scales() {
           };
           from_cells(around_);
           from_cells(plug_cells_);
-          const Vec3 reach = Vec3::Constant(store_->largest_radius() + closing());
-          store_->for_each_in_box(lo - reach, hi + reach, [&](const StoredGranule& g) { visit({g.position, g.radius}); });
+          // the box is the observer's
+          const Vec3 middle = observer_.to_world(0.5 * (lo + hi));
+          const Vec3 half = turned_half_box(observer_.turn(), 0.5 * (hi - lo) + Vec3::Constant(store_->largest_radius() + closing()));
+          for_each_stored_in_box(middle - half, middle + half, [&](const StoredGranule& g) {
+            visit({observer_.to_frame(nearest_image(in_world(g), middle)), g.radius});
+          });
         });
+}
+
+void FixSolidCull::find_movable() {
+  // only what an integrator moves and gravity pulls can be part of a solid body; what another fix holds or drives stays exterior
+  static const char* holding[] = {"freeze", "setforce", "move", "planeforce", "lineforce", "aveforce"};
+  static const char* driving[] = {"addforce", "drag", "efield", "spring", "buoyancy"};
+  movable_ = held_ = gravity_bit_ = 0;
+  const auto begins = [](const LAMMPS_NS::Fix* fix, const char* style) { return std::strncmp(fix->style, style, std::strlen(style)) == 0; };
+  for (int f = 0; f < modify->nfix; ++f) {
+    const LAMMPS_NS::Fix* fix = modify->fix[f];
+    if (begins(fix, "nve")) movable_ |= fix->groupbit;
+    if (begins(fix, "gravity")) gravity_bit_ |= fix->groupbit;
+    for (const char* style : holding)
+      if (begins(fix, style) && !begins(fix, "move/mesh")) held_ |= fix->groupbit;
+    for (const char* style : driving)
+      if (begins(fix, style)) {
+        held_ |= fix->groupbit;
+        say("fix " + std::string(id) + " solid/cull: fix " + fix->id + " (" + fix->style + ") adds forces that culled granules would miss: granules of its group are not culled");
+      }
+  }
 }
 
 void FixSolidCull::init() {
@@ -263,7 +290,10 @@ void FixSolidCull::init() {
     refuse("the contact model's history has changed from " + std::to_string(contacts_.width()) + " to " + std::to_string(flips.size()) +
            " numbers while granules are culled: unfix " + id + " before the pair_style changes");
   contacts_.set_layout(flips);
+  contacts_.set_vectors(histories_.vectors());
+  find_movable();
   halo_.update();
+  bodies_.set_periods(Vec3(domain->xperiodic ? domain->xprd : 0, domain->yperiodic ? domain->yprd : 0, domain->zperiodic ? domain->zprd : 0));
   new_run_ = true;
 }
 
@@ -298,14 +328,10 @@ void FixSolidCull::pre_initial_integrate() {
   if (!store_) return;
   take_loads();
   const Vec3 g = gravity();
-  if (any_rank(!locked_index_.empty()) && gravity_changed(g, gravity_at_locking_)) {
-    say("fix " + std::string(id) + " solid/cull: gravity has changed; all granules wake");
-    wake_all_ = true;
-    next_reneighbor = update->ntimestep;
-  }
-  see_walls();
-  wake_where_walls_are_gone();
-  if (any_rank(!waking_.empty())) next_reneighbor = update->ntimestep;
+  if (g != gravity_then_) watch_effective_gravity(true);
+  gravity_then_ = g;
+  see_walls(true);
+  if (any_rank(!waking_.empty() || !waking_bodies_.empty())) next_reneighbor = update->ntimestep;
   const std::int64_t interval = static_cast<std::int64_t>(look_every_) * look_factor_;
   next_look_ = ((update->ntimestep - 1) / interval + 1) * interval;
 }
@@ -316,7 +342,7 @@ void FixSolidCull::pre_exchange() {
   if (!store_) return;
   if (any_rank(halo_.subdomain_changed())) {
     halo_.update();
-    move_home();
+    at_home_.clear();
   }
   change_membership();
 }
@@ -325,12 +351,8 @@ void FixSolidCull::pre_neighbor() {
   locked_index_stale_ = true;
   lists_are_new_ = true;
   if (!store_) return;
-  if (halo_.needed()) {
-    ghost_interface_.clear();
-    const int bit = group->bitmask[interface_group_];
-    for (int i = atom->nlocal; i < atom->nlocal + atom->nghost; ++i)
-      if (atom->mask[i] & bit) ghost_interface_[atom->tag[i]] = 1;
-  }
+  take_over_atoms();
+  share_bodies();
   check_inserted();
   if (checking()) check_invariants();
 }
@@ -340,22 +362,42 @@ void FixSolidCull::check_invariants() {
   const int bit = group->bitmask[interface_group_];
   for (int i = 0; i < atom->nlocal + atom->nghost; ++i) {
     if (atom->mask[i] & bit) continue;
-    store_->for_each_near(sphere(i), 0.0, [&](const StoredGranule& g) {
+    for_each_stored_near(sphere(i), 0.0, [&](const StoredGranule& g) {
       broken("exterior granule " + std::to_string(atom->tag[i]) + " touches interior granule " + std::to_string(g.tag));
     });
   }
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (shell_[i].locked && store_bodies_ > 1)
+      for_each_stored_near(sphere(i), 0.0, [&](const StoredGranule& g) {
+        broken("granule " + std::to_string(atom->tag[i]) + " of another body touches interior granule " + std::to_string(g.tag));
+      }, key_of(shell_[i].body));
   // I2: the ledger
   if (ledger_.count_due() != static_cast<std::int64_t>(store_->size()))
     broken("the ledger has " + std::to_string(ledger_.count_due()) + " granules in the store, which holds " + std::to_string(store_->size()));
   const double mass = store_->mass();
   if (std::abs(ledger_.mass_error(*store_)) > 1e-12 * mass) broken("mass in the store differs from the ledger");
-  for (int d = 0; d < 3; ++d)
-    if (std::abs(ledger_.moment_error(*store_, d)) > 1e-12 * mass * domain->prd[d]) broken("the first moment of the store differs from the ledger");
   // every locked granule is a member of a body, and nothing else is
   std::size_t locked = store_->size();
   for (int i = 0; i < atom->nlocal; ++i) locked += shell_[i].locked;
   if (locked != bodies_.locked())
     broken(std::to_string(bodies_.locked()) + " granules are in bodies and " + std::to_string(locked) + " are locked");
+  // and each body has the count, mass and first moment of its granules
+  std::map<int, MassProperties> sums;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const ShellEntry& e = shell_[i];
+    if (!e.locked) continue;
+    if (e.body != bodies_.body_of(atom->tag[i])) broken("interface granule " + std::to_string(atom->tag[i]) + " stands in the wrong body");
+    sums[e.body].add(atom->rmass[i], e.place, atom->radius[i]);
+  }
+  store_->for_each([&](const StoredGranule& g) {
+    if (g.body != bodies_.body_of(g.tag)) broken("interior granule " + std::to_string(g.tag) + " lies in the wrong body");
+    sums[g.body].add(g.mass, g.position, g.radius);
+  });
+  for (const auto& [number, sum] : sums) {
+    const MassProperties& m = bodies_.body(number).mass;
+    if (m.count != sum.count || std::abs(m.mass - sum.mass) > 1e-12 * sum.mass || (m.centre() - sum.centre()).norm() > 1e-9 * domain->prd[0])
+      broken("body " + std::to_string(number) + " has other mass properties than its granules");
+  }
 }
 
 void FixSolidCull::setup_pre_force(int) {
@@ -372,16 +414,17 @@ void FixSolidCull::pre_force(int) {
 void FixSolidCull::leave_locked_pairs_out() {
   // `neigh_modify exclude` would do it, at a test for every candidate pair: neighbour builds take 1.7 times as long with it
   const auto timed = watch_.time(Part::load);
-  const int bit = group->bitmask[interface_group_];
+  std::vector<int> body(static_cast<std::size_t>(atom->nlocal + atom->nghost));
+  for (int i = 0; i < atom->nlocal + atom->nghost; ++i) body[i] = key_of_atom(i);
   LAMMPS_NS::NeighList* list = force->pair->list;
   LAMMPS_NS::NeighList* histories = force->pair->listgranhistory;
   const int width = static_cast<LAMMPS_NS::PairGran*>(force->pair)->dnum();
   for (int row = 0; row < list->inum; ++row) {
     const int i = list->ilist[row];
-    if (i >= atom->nlocal || !(atom->mask[i] & bit)) continue;
+    if (i >= atom->nlocal || !body[i]) continue;
     int kept = 0;
     for (int k = 0; k < list->numneigh[i]; ++k) {
-      if (atom->mask[list->firstneigh[i][k] & NEIGHMASK] & bit) continue;
+      if (body[list->firstneigh[i][k] & NEIGHMASK] == body[i]) continue;
       list->firstneigh[i][kept] = list->firstneigh[i][k];
       if (histories) {
         histories->firstneigh[i][kept] = histories->firstneigh[i][k];
@@ -396,18 +439,15 @@ void FixSolidCull::leave_locked_pairs_out() {
 
 void FixSolidCull::take_loads() {
   const auto timed = watch_.time(Part::load);
-  if (locked_index_stale_) {
-    locked_index_.clear();
-    for (int i = 0; i < atom->nlocal; ++i)
-      if (shell_[i].locked) locked_index_.push_back(i);
-    locked_index_stale_ = false;
-  }
+  refresh_locked();
+  if (rigid() && !(active_.empty() && spanning_.empty())) sum_loads();
   if (thawed_) rebase_thawed_contacts();
   largest_excess_ = 0;
   double** force = atom->f;
-  for (const int i : locked_index_) {
+  for (std::size_t k = 0; k < locked_index_.size(); ++k) {
+    const int i = locked_index_[k];
     ShellEntry& e = shell_[i];
-    const Vec3 load = vec(force[i]);
+    const Vec3 load = active_[locked_slot_[k]].body->pose.turned_to_frame(vec(force[i]));
     if (e.fresh) {
       e.reference = load - e.load_change;
       e.fresh = false;
@@ -441,15 +481,17 @@ void FixSolidCull::rebase_thawed_contacts() {
       const double reach = (atom->radius[i] + atom->radius[j]) * neighbor->contactDistanceFactor;
       if ((vec(atom->x[i]) - vec(atom->x[j])).squaredNorm() > reach * reach) continue;
       const Vec3 f = pair_force_.on_first(i, k);
-      if (stays && other_freed) shell_[i].reference += f;
-      if (freed && other_stays) shell_[j].reference -= f;
+      if (stays && other_freed) shell_[i].reference += bodies_.pose(shell_[i].body).turned_to_frame(f);
+      if (freed && other_stays) shell_[j].reference -= bodies_.pose(shell_[j].body).turned_to_frame(f);
     }
   }
 }
 
 void FixSolidCull::ask_for_reneighbouring_if_waking() {
+  // gentle loads wait for each other; a blow does not: what it strikes would stand like a rock until then
+  if (locked_everywhere_ == 0) return;
   const bool time = update->ntimestep % wake_together == 0;
-  if (!time) return;
+  if (comm->nprocs == 1 ? !(time || largest_excess_ > blow) : !(time || any_rank(largest_excess_ > blow))) return;
   bool waking = false;
   for (const int i : locked_index_) {
     ShellEntry& e = shell_[i];
@@ -459,7 +501,10 @@ void FixSolidCull::ask_for_reneighbouring_if_waking() {
     }
     e.excess = 0;
   }
-  if (any_rank(waking)) next_reneighbor = update->ntimestep + 1;
+  int asked[2] = {waking || (rigid() && body_comes_too_far(wake_together + 1)), rigid() && body_is_fast(wake_together + 1)};
+  if (comm->nprocs > 1) MPI_Allreduce(MPI_IN_PLACE, asked, 2, MPI_INT, MPI_MAX, world);
+  if (asked[0]) next_reneighbor = update->ntimestep + 1;
+  fast_bodies_ = asked[1];
 }
 
 void FixSolidCull::pre_final_integrate() {
@@ -472,12 +517,7 @@ void FixSolidCull::pre_final_integrate() {
   ask_for_reneighbouring_if_waking();
   if (update->ntimestep == next_look_) {
     look();
-    const Vec3 g = gravity();
-    if (any_rank(!locked_index_.empty()) && gravity_changed(g, gravity_at_locking_)) {
-      wake_all_ = true;
-      next_reneighbor = update->ntimestep + 1;
-    }
-    if (any_rank(!waking_.empty())) next_reneighbor = update->ntimestep + 1;
+    if (any_rank(!waking_.empty() || !waking_bodies_.empty())) next_reneighbor = update->ntimestep + 1;
   }
   if (stored_everywhere_ > 0) open_for_insertion();
 }
@@ -496,34 +536,59 @@ void FixSolidCull::end_of_step() {
 double FixSolidCull::compute_scalar() { return compute_vector(2); }
 
 double FixSolidCull::compute_vector(int n) {
-  if (totals_.empty() || totals_step_ != update->ntimestep || totals_version_ != membership_version_) {
-    totals_step_ = update->ntimestep;
-    totals_version_ = membership_version_;
-    totals_.assign(12, 0.0);
-    const std::map<int, int> number = global_bodies();
-    double bodies = static_cast<double>(bodies_.size());
-    if (comm->nprocs > 1) {
-      bodies = 0;
-      for (const auto& b : number) bodies += b.second == b.first * comm->nprocs + comm->me;
-    }
-    double interface = 0;
-    for (int i = 0; i < atom->nlocal; ++i) interface += shell_[i].locked;
-    double sums[9] = {atom->nlocal - interface,
-                      interface,
-                      store_ ? static_cast<double>(store_->size()) : 0.0,
-                      bodies,
-                      store_ ? store_->mass() : 0.0,
-                      static_cast<double>(ledger_.granules_locked()),
-                      static_cast<double>(ledger_.granules_restored()),
-                      store_ ? ledger_.mass_error(*store_) : 0.0,
-                      ledger_.energy_added()};
-    MPI_Allreduce(MPI_IN_PLACE, sums, 9, MPI_DOUBLE, MPI_SUM, world);
-    double largest[2] = {largest_excess_, watch_.total()};
-    MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, world);
-    totals_ = {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], static_cast<double>(ledger_.carves()),
-               largest[0], largest[1], sums[7], sums[8]};
+  if (n < 0 || n >= size_vector) return 0;
+  if (totals_step_ != update->ntimestep || totals_version_ != membership_version_) {
+    totals_.clear();
+    carried_.clear();
   }
-  return n >= 0 && n < 12 ? totals_[n] : 0.0;
+  totals_step_ = update->ntimestep;
+  totals_version_ = membership_version_;
+  if (totals_.empty()) count_totals();
+  if (n < counts) return totals_[n];
+  if (carried_.empty()) sum_carried();
+  return carried_[n - counts];
+}
+
+void FixSolidCull::count_totals() {
+  double bodies = 0, interface = 0;
+  for (const auto& b : bodies_.bodies()) bodies += key_of(b.first) == b.first * comm->nprocs + comm->me;
+  for (int i = 0; i < atom->nlocal; ++i) interface += shell_[i].locked;
+  double sums[9] = {atom->nlocal - interface,
+                    interface,
+                    store_ ? static_cast<double>(store_->size()) : 0.0,
+                    bodies,
+                    store_ ? store_->mass() : 0.0,
+                    static_cast<double>(ledger_.granules_locked()),
+                    static_cast<double>(ledger_.granules_restored()),
+                    store_ ? ledger_.mass_error(*store_) : 0.0,
+                    ledger_.energy_added()};
+  MPI_Allreduce(MPI_IN_PLACE, sums, 9, MPI_DOUBLE, MPI_SUM, world);
+  double largest[2] = {largest_excess_, watch_.total()};
+  MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, world);
+  totals_ = {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], static_cast<double>(ledger_.carves()),
+             largest[0], largest[1], sums[7], sums[8]};
+}
+
+void FixSolidCull::sum_carried() {
+  // what interior granules carry, so that a deck can add it to what its atoms have: momentum, angular momentum about the origin,
+  // kinetic energy, and their centre of mass
+  double mass = 0;
+  Vec3 momentum = Vec3::Zero(), turning = Vec3::Zero(), moment = Vec3::Zero();
+  double energy = 0;
+  if (store_)
+    store_->for_each([&](const StoredGranule& g) {
+      const Twist& twist = bodies_.body(g.body).twist;
+      const Vec3 x = in_world(g);
+      const RigidPart p = RigidPart::granule(g.mass, g.radius, x, twist.at(x), twist.spin);
+      mass += g.mass;
+      momentum += g.mass * p.velocity;
+      turning += p.angular_momentum(Vec3::Zero());
+      energy += p.kinetic_energy();
+      moment += g.mass * x;
+    });
+  carried_ = {momentum[0], momentum[1], momentum[2], turning[0], turning[1], turning[2], energy, moment[0], moment[1], moment[2], mass};
+  MPI_Allreduce(MPI_IN_PLACE, carried_.data(), static_cast<int>(carried_.size()), MPI_DOUBLE, MPI_SUM, world);
+  for (int d = 7; d < 10; ++d) carried_[d] = carried_[10] > 0 ? carried_[d] / carried_[10] : 0.0;
 }
 
 double FixSolidCull::memory_usage() {
@@ -575,13 +640,14 @@ void FixSolidCull::set_arrays(int i) {
 }
 
 int FixSolidCull::pack_exchange(int i, double* buffer) {
-  shell_[i].pack(buffer);
+  (shell_[i].locked && shell_[i].body > 0 ? shell_[i].in_world(bodies_.pose(shell_[i].body)) : shell_[i]).pack(buffer);
   buffer[ShellEntry::packed_size] = vector_atom[i];
   return ShellEntry::packed_size + 1;
 }
 
 int FixSolidCull::unpack_exchange(int i, double* buffer) {
   shell_[i] = ShellEntry::unpack(buffer);
+  shell_[i].body = -1;  // to be taken over: see take_over_atoms
   vector_atom[i] = buffer[ShellEntry::packed_size];
   return ShellEntry::packed_size + 1;
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,9 @@
 
 namespace solidcull {
 
+/// Largest way (m) that a point of the box (body frame) has gone from one pose to the other.
+double largest_way(const Pose& then, const Pose& now, const Vec3& lo, const Vec3& hi);
+
 class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
  public:
   FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg);
@@ -41,11 +45,14 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void setup(int) override;
   void setup_pre_exchange() override;
   void pre_initial_integrate() override;
+  void post_integrate() override;
   void pre_exchange() override;
   void pre_neighbor() override;
+  void setup_pre_neighbor() override { pre_neighbor(); }
   void setup_pre_force(int) override;
   void pre_force(int) override;
   void pre_final_integrate() override;
+  void final_integrate() override;
   void end_of_step() override;
   void post_run() override;
 
@@ -74,27 +81,95 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void broken(const std::string& what);      // ours; local
   void refuse_what_cannot_be_culled();
   void find_scales();
+  void find_movable();
   Vec3 gravity() const;
   void leave_locked_pairs_out();
   void take_loads();
   void rebase_thawed_contacts();
   void ask_for_reneighbouring_if_waking();
   void check_invariants();                   // I1 and I2; local
+  void count_totals();
+  void sum_carried();
   bool any_rank(bool here) const;
   void say(const std::string& line) const;
   double closing() const;        // radius of the ball that fits into no pore (m)
   double surface_reach() const;  // how far a granule can change another one's depth (m)
 
+  bool rigid() const { return settings_.motion == Motion::rigid; }
+
+  // --- fix_solid_cull_bodies.cpp: how solid bodies move -------------------------------------------------------------------
+  struct ActiveBody {
+    int number;
+    SolidBody* body;
+    Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // N and N m about the centre of mass, of the whole body
+    double reach = 0, way = 0;  // of its interior granules: farthest from the centre; bound of their way since the last reneighbouring (m)
+    int spanning = -1;                                 // its place among the bodies that span ranks
+  };
+  struct Group {
+    int key;      // the body's number on all ranks
+    Vec3 shift;   // brings this rank's part to the image in which the whole is summed (m)
+  };
+  struct FieldInFrame;
+  void refresh_locked();
+  std::vector<FieldInFrame> fields_of_bodies() const;
+  void sum_loads();
+  double way_in_a_step(const ActiveBody& a) const;
+  bool body_comes_too_far(int steps) const;
+  bool body_is_fast(int steps) const;
+  void place_interface_granules();
+  void give_velocities();
+  void settle_bodies();
+  void adopt_places();
+  void group_bodies();
+  int key_of(int body) const;
+  int key_of_atom(int i) const;               // owned or ghost; 0: exterior
+  void watch_effective_gravity(bool new_gravity);
+  void wake_body(int key);
+  void hand_over();
+  void take_over_atoms();
+  double kinetic_energy(int body) const;
+  Vec3 nearest_image(const Vec3& x, const Vec3& to) const;
+  Vec3 in_world(const StoredGranule& g) const { return bodies_.pose(g.body).to_world(g.position); }
+  double store_slack() const;                 // how far outside its subdomain a rank may hold a stored granule (m)
+
+  /// Stored granules whose surface is closer than `gap` to the sphere's (world frame), but for those of the body `except`.
+  template <class Visit>
+  void for_each_stored_near(const Sphere& s, double gap, Visit visit, int except = 0) const {
+    store_->for_each_body([&](int body, const Vec3&, const Vec3&) {
+      if (except && key_of(body) == except) return;
+      const Pose& pose = bodies_.pose(body);
+      for (const Vec3& shift : halo_.image_shifts()) store_->for_each_near(body, {pose.to_frame(s.centre + shift), s.radius}, gap, visit);
+    });
+  }
+  /// Stored granules in the box (world frame), and some around it.
+  template <class Visit>
+  void for_each_stored_in_box(const Vec3& lo, const Vec3& hi, Visit visit, int only = 0) const {
+    const Vec3 middle = 0.5 * (lo + hi), half = 0.5 * (hi - lo);
+    store_->for_each_body([&](int body, const Vec3&, const Vec3&) {
+      if (only && body != only) return;
+      const Pose& pose = bodies_.pose(body);
+      const Vec3 reach = turned_half_box(pose.turn().transpose(), half);
+      for (const Vec3& shift : halo_.image_shifts()) {
+        const Vec3 at = pose.to_frame(middle + shift);
+        store_->for_each_in_box(body, at - reach, at + reach, visit);
+      }
+    });
+  }
+
   // --- fix_solid_cull_look.cpp: what is in solid state, deep enough, exposed -----------------------------------------------
   void look();
-  std::vector<char> find_quiet();
-  void see_walls();
+  bool find_calm();
+  bool can_be_culled(int mask) const;
+  int calm_needed(const ShellEntry& e) const { return settings_.calm << e.wakes; }
+  void pause_where_bodies_wake();
+  std::vector<Vec3> accelerations() const;
+  void follow_with_surface();
+  void see_walls(bool new_run);
   void register_with_surface();
   void choose();
   void find_exposed();
   void prepare_locking();
   void schedule_next_look(std::int64_t chosen, std::int64_t exterior);
-  void wake_where_walls_are_gone();
 
   // --- fix_solid_cull_membership.cpp: exterior <-> interface <-> interior --------------------------------------------------
   struct Ball {
@@ -107,10 +182,16 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void free_what_wakes(bool all);
   void lock_what_was_chosen();
   void tell_neighbours();
+  void count_bodies();
   void share_exterior();
   void keep_shell_closed();
   void freeze_contacts();
+  void freeze_inner_contacts();
+  void freeze_histories();
+  void share_bodies();
   void thaw_contacts();
+  void lock_into_bodies();
+  void free_from_bodies();
   void store_what_is_deep();
   void publish_atom_counts();
   void label_bodies();
@@ -123,18 +204,19 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   double contact_reach() const;
   void open_for_insertion();
   void check_inserted();
-  std::map<int, int> global_bodies();
-  GranuleMass mass_of(std::int64_t tag);
+  void fetch_near_walls(std::set<std::int64_t>& near);
+  GranuleMass mass_of(std::int64_t tag) const;
+  MovingGranule moving(int i) const;
   Sphere sphere(int i) const;
 
   // --- fix_solid_cull_restart.cpp: the store as numbers, to a file or to another rank ---------------------------------------
-  std::vector<double> serialise(const std::vector<std::int64_t>& tags) const;
+  std::vector<double> serialise(const std::vector<std::int64_t>& stored, const std::vector<std::int64_t>& atoms) const;
   void take_up(const std::vector<double>& blocks);
   void take_up_restart_state();
-  void found_bodies_anew();
 
   // --- fix_solid_cull_files.cpp: outputs -----------------------------------------------------------------------------------
   void update_meshes();
+  const Pose& pose_of_mesh(int body) const;
   void write_mesh_file(const std::string& pattern);
   void write_bed_file(const std::string& pattern);
   std::string file_of_step(const std::string& pattern) const;
@@ -152,7 +234,12 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   int look_every_ = 0;
   SolidStateLaw solid_state_{};
   WakeUpLaw wake_up_{};
-  Vec3 gravity_at_locking_ = Vec3::Zero();
+  Vec3 gravity_then_ = Vec3::Zero();  // at the last look
+  int movable_ = 0;            // bits of groups that an integrator moves
+  int gravity_bit_ = 0;        // bits of groups that gravity pulls
+  int held_ = 0;               // bits of groups that some fix holds or drives: never culled
+  int pause_ = 0;              // looks that culling waits after a body woke as a whole; doubles while that goes on
+  std::int64_t no_cull_until_ = -1;
 
   // the solid
   std::vector<ShellEntry> shell_;  // by atom index
@@ -162,13 +249,20 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   Ledger ledger_;
   std::map<int, InterfaceMesh> meshes_;
   bool meshes_wanted_ = false;
+  struct Merge {
+    int kept, swallowed;
+    Pose pose;  // of the swallowed one
+  };
+  std::vector<Merge> merges_;       // in the last change: what happened to their meshes
   std::vector<double> largest_radius_by_type_;
 
   // the surface
   std::unique_ptr<ImplicitSurface> surface_;
   SphereCells around_;              // owned granules and halo at the last look
-  std::vector<Sphere> plugs_;       // behind walls (walls closed)
+  std::vector<Sphere> plugs_;       // behind still walls (walls closed); world frame
   FlatMap<char> plugged_;
+  FlatMap<Sphere> moving_plugs_;    // behind walls that can move, as seen at the last look; the observer's frame
+  std::vector<std::string> walls_then_;
   SphereCells plug_cells_;
   bool plugs_changed_ = false;
   bool halo_drawn_ = false;
@@ -195,12 +289,45 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::vector<Ball> balls_;
   FlatMap<int> index_of_;
   std::vector<std::int64_t> freed_, locked_now_;
-  std::vector<Sphere> halo_exterior_;
+  struct Foreign {
+    Sphere sphere;
+    int body;  // key; 0: exterior
+  };
+  std::vector<Foreign> halo_foreign_;  // other ranks' and periodic images' exterior and interface granules
   std::int64_t stored_everywhere_ = 0;
+  std::int64_t locked_everywhere_ = 0;
+  int store_bodies_ = 0;            // bodies on all ranks: with one alone, none can come near another
   bool shell_reopened_ = false;     // the shell grew by granules that something came near to
-  FlatMap<char> freed_anywhere_, locked_anywhere_, ghost_interface_;
+  FlatMap<char> freed_anywhere_, locked_anywhere_;
+  FlatMap<int> ghost_body_;         // tag -> key of the body of an interface ghost
+  std::vector<int> freed_keys_;     // bodies that wake as a whole, by key, in this change
+  struct FreshContact {
+    std::int64_t tag, partner;
+    std::vector<double> history;    // as tag sees it, world frame
+  };
+  std::vector<FreshContact> fresh_contacts_;
+  std::vector<double> joins_;       // rows (place of a, a, b): resting against another body for long enough
+  struct Arrival {
+    SolidBodies::Place at;
+    double mass = 0, radius = 0;
+  };
+  FlatMap<Arrival> arriving_;  // interface granules handed over by another rank in this reneighbouring
+
+  // bodies in motion
+  std::vector<ActiveBody> active_;
+  bool fast_bodies_ = false;        // some body may come too far between two times when ranks talk
+  std::map<int, Group> groups_;     // local body -> the body that it is a part of; empty on one rank
+  std::vector<int> spanning_;       // keys of bodies that span ranks, the same on all ranks
+  std::map<int, std::array<bool, 3>> group_spans_;
+  std::set<int> waking_bodies_;     // keys
+  std::map<int, Pose> clear_of_walls_, at_home_, drawn_;  // poses of bodies when walls, ranks, surface were last compared
+  Pose observer_;                   // the frame in which the implicit surface is drawn: that of the largest body
+  int observed_ = 0;                // that body
+  Pose observed_then_;              // where it was when the observer last followed
 
   std::vector<int> locked_index_;   // atom indices of interface granules since the last reneighbouring
+  std::vector<int> locked_slot_;    // their bodies in active_
+  std::vector<Vec3> locked_place_;  // and places there
   bool locked_index_stale_ = true;
   bool lists_are_new_ = false;
   bool thawed_ = false;
@@ -214,7 +341,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   double largest_excess_ = 0;
   std::vector<double> restart_state_;
   StopWatch watch_;
-  std::vector<double> totals_;
+  static constexpr int counts = 12;      // f_ID[1..12]; after them what interior granules carry
+  std::vector<double> totals_, carried_;
   std::int64_t totals_step_ = -1, totals_version_ = -1;
 };
 

@@ -6,6 +6,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "domain.h"
 #include "engine_vectors.h"
 #include "fix_solid_cull.h"
 #include "mesh_files.h"
@@ -17,25 +18,37 @@ const std::map<int, InterfaceMesh>& FixSolidCull::interface_meshes() {
   if (!meshes_wanted_ && store_) {
     meshes_wanted_ = true;
     meshes_.clear();
-    bodies_.take_merges();
+    merges_.clear();
     locked_now_.clear();
+    index_of_.clear();
+    for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
     update_meshes();
   }
+  for (auto& mesh : meshes_) mesh.second.set_pose(bodies_.pose(mesh.first));
   return meshes_;
+}
+
+const Pose& FixSolidCull::pose_of_mesh(int body) const {
+  for (const Merge& m : merges_)
+    if (m.swallowed == body) return m.pose;
+  return bodies_.pose(body);
 }
 
 void FixSolidCull::update_meshes() {
   const auto timed = watch_.time(Part::mesh);
-  for (const auto& merge : bodies_.take_merges()) {
-    const auto swallowed = meshes_.find(merge.second);
+  for (const Merge& merge : merges_) {
+    const auto swallowed = meshes_.find(merge.swallowed);
     if (swallowed == meshes_.end()) continue;
-    const auto kept = meshes_.find(merge.first);
-    if (kept != meshes_.end())
+    const auto kept = meshes_.find(merge.kept);
+    if (kept != meshes_.end()) {
+      // in a chain of merges the kept one may be swallowed by now
+      kept->second.set_pose(pose_of_mesh(merge.kept));
+      swallowed->second.set_pose(merge.pose);
       kept->second.merge(std::move(swallowed->second));
-    else
-      meshes_.emplace(merge.first, std::move(swallowed->second));
+    }
     meshes_.erase(swallowed);
   }
+  merges_.clear();
   for (auto mesh = meshes_.begin(); mesh != meshes_.end();)
     mesh = bodies_.bodies().count(mesh->first) ? std::next(mesh) : meshes_.erase(mesh);
 
@@ -48,8 +61,6 @@ void FixSolidCull::update_meshes() {
   bool whole = false;
   for (const auto& body : bodies_.bodies()) whole = whole || !meshes_.count(body.first);
   if (whole) {
-    index_of_.clear();
-    for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
     std::vector<std::pair<std::int64_t, int>> members;
     bodies_.for_each_member([&](std::int64_t tag, int body) {
       if (!meshes_.count(body)) members.emplace_back(tag, body);
@@ -63,6 +74,7 @@ void FixSolidCull::update_meshes() {
   }
   for (const auto& a : added) {
     const auto mesh = meshes_.try_emplace(a.first, settings_.voxel * diameter_, closing()).first;
+    mesh->second.set_pose(bodies_.pose(a.first));
     mesh->second.add(a.second);
   }
 }
@@ -74,7 +86,6 @@ std::string FixSolidCull::file_of_step(const std::string& pattern) const {
 }
 
 void FixSolidCull::write_mesh_file(const std::string& pattern) {
-  const std::map<int, int> number = global_bodies();
   const std::map<int, InterfaceMesh>& mine = interface_meshes();
   const auto timed = watch_.time(Part::files);
   // each rank sends its part of each body; rank 0 unites the parts
@@ -88,8 +99,7 @@ void FixSolidCull::write_mesh_file(const std::string& pattern) {
       std::int64_t head[2] = {0, 0};
       if (rank == comm->me) {
         bytes = mesh->second.to_bytes();
-        const auto n = number.find(mesh->first);
-        head[0] = n == number.end() ? mesh->first : n->second;
+        head[0] = comm->nprocs == 1 ? mesh->first : key_of(mesh->first);
         head[1] = static_cast<std::int64_t>(bytes.size());
         ++mesh;
       }
@@ -146,7 +156,6 @@ void FixSolidCull::write_bed_file(const std::string& pattern) {
   const auto timed = watch_.time(Part::files);
   constexpr int columns = 11;
   std::vector<double> rows;
-  const std::map<int, int> number = global_bodies();
   const auto row = [&](const Vec3& x, const Vec3& v, double radius, double tag, double type, GranuleState state, double body) {
     rows.insert(rows.end(), {x[0], x[1], x[2], v[0], v[1], v[2], radius, tag, type, double(static_cast<int>(state)), body});
   };
@@ -157,10 +166,12 @@ void FixSolidCull::write_bed_file(const std::string& pattern) {
     row(vec(atom->x[i]), vec(atom->v[i]), atom->radius[i], atom->tag[i], atom->type[i], state, vector_atom[i]);
   }
   store_->for_each([&](const StoredGranule& g) {
-    const int body = bodies_.body_of(g.tag);
-    const auto n = number.find(body);
-    row(g.position, Vec3::Zero(), g.radius, static_cast<double>(g.tag), g.type, GranuleState::interior,
-        n == number.end() ? body : n->second);
+    const Twist& twist = bodies_.body(g.body).twist;
+    double x[3];
+    set(x, in_world(g));
+    domain->remap(x);
+    row(vec(x), twist.at(in_world(g)), g.radius, static_cast<double>(g.tag), g.type, GranuleState::interior,
+        comm->nprocs == 1 ? g.body : key_of(g.body));
   });
   rows = halo_.gather_root(rows);
   std::string failure;

@@ -6,6 +6,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "domain.h"
 #include "engine_vectors.h"
 #include "fix_solid_cull.h"
 #include "force.h"
@@ -28,30 +29,30 @@ constexpr double wall_closes = 0.2;
 // granules, or until a granule has waited for that many looks
 constexpr double worth_share = 0.05;
 constexpr int longest_wait = 10;
+// a granule still stands at a wall that is this share of its radius away, or nearer
+constexpr double wall_still_there = 0.01;
+// looks that culling waits after bodies woke as a whole
+constexpr int shortest_pause = 2, longest_pause = 32;
 // where looks find nothing, they come up to this many times more seldom
 constexpr int largest_look_factor = 16;
-
 
 }  // namespace
 
 void FixSolidCull::look() {
   const auto timed = watch_.time(Part::look);
-  see_walls();
-  const std::vector<char> quiet = find_quiet();
+  see_walls(false);
+  const Vec3 g = gravity();
+  watch_effective_gravity(false);
+  gravity_then_ = g;
+  pause_where_bodies_wake();
+  const bool may_cull = update->ntimestep >= no_cull_until_;
   bool candidates = false;
-  for (int i = 0; i < atom->nlocal; ++i) {
-    ShellEntry& e = shell_[i];
-    if (e.locked) continue;
-    const bool solid = quiet[i] && (atom->mask[i] & groupbit) && solid_state_.at_rest(vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]) &&
-                       solid_state_.balanced(vec(atom->f[i]), atom->rmass[i]);
-    e.calm = solid ? e.calm + 1 : 0;
-    candidates = candidates || e.calm >= settings_.calm;
-  }
-  wake_where_walls_are_gone();
+  if (may_cull) candidates = find_calm();
   const bool any_candidates = any_rank(candidates), any_locked = any_rank(!locked_index_.empty());
   chosen_.clear();
   if (any_candidates || any_locked) {
     const auto timed_depth = watch_.time(Part::depth);
+    follow_with_surface();
     register_with_surface();
     choose();
     find_exposed();
@@ -62,54 +63,137 @@ void FixSolidCull::look() {
   MPI_Allreduce(MPI_IN_PLACE, counts, 3, MPI_INT64_T, MPI_SUM, world);
   if (counts[0] > 0) {
     prepare_locking();
-    if (!any_locked) gravity_at_locking_ = gravity();
     if (counts[0] >= worth_share * static_cast<double>(counts[1]) || counts[2] > 0) next_reneighbor = update->ntimestep + 1;
   }
+  if (any_rank(!joins_.empty())) next_reneighbor = update->ntimestep + 1;
   schedule_next_look(counts[0], counts[1]);
 }
 
-void FixSolidCull::see_walls() {
-  for (int i = 0; i < atom->nlocal; ++i) {
-    shell_[i].walls = 0;
-    shell_[i].wall_near = false;
+void FixSolidCull::pause_where_bodies_wake() {
+  // a scene that is shaken wakes most of what is culled again and again: culling waits, longer each time, until it stops
+  std::int64_t counts[2] = {0, static_cast<std::int64_t>(bodies_.locked())};
+  for (const auto& b : bodies_.bodies())
+    if (waking_bodies_.count(key_of(b.first))) counts[0] += b.second.mass.count;
+  MPI_Allreduce(MPI_IN_PLACE, counts, 2, MPI_INT64_T, MPI_SUM, world);
+  if (2 * counts[0] > counts[1]) {
+    pause_ = std::min(std::max(2 * pause_, shortest_pause), longest_pause);
+    no_cull_until_ = update->ntimestep + pause_ * look_every_;
+  } else if (pause_ > 0 && update->ntimestep > no_cull_until_ + 4 * pause_ * look_every_) {
+    pause_ = 0;
   }
+}
+
+void FixSolidCull::see_walls(bool new_run) {
+  if (new_run) {
+    // a wall that has gone leaves nothing behind that would close the surface
+    std::vector<std::string> now = walls_.names();
+    if (!std::includes(now.begin(), now.end(), walls_then_.begin(), walls_then_.end())) {
+      plugs_.clear();
+      plugged_.clear();
+      plugs_changed_ = true;
+      if (surface_) surface_->touch_all();
+    }
+    walls_then_ = std::move(now);
+  }
+  const int owned = atom->nlocal;
+  std::vector<int> touched(owned, 0), there(owned, 0);
+  std::vector<char> moves(owned, 0), near(owned, 0);
+  FlatMap<Sphere> moving_plugs;
   const double plug_radius = 0.5 * (settings_.depth * diameter_ + closing()) + diameter_;
   for (const WallContact& c : walls_.find()) {
-    ShellEntry& e = shell_[c.granule];
-    e.wall_near = true;
-    if (c.gap <= 0) ++e.walls;
-    if (settings_.walls == Walls::surface || c.gap > wall_closes * atom->radius[c.granule] || c.moving) continue;
-    // a plug behind the wall: once there it stays, for the place behind a wall is no void whoever stands before it
+    const int i = c.granule;
+    near[i] = true;
+    if (c.gap <= wall_still_there * atom->radius[i]) ++there[i];
+    if (c.gap <= 0) {
+      ++touched[i];
+      moves[i] = moves[i] || c.moving;
+    }
+    const ShellEntry& e = shell_[i];
+    if (settings_.walls == Walls::surface || c.gap > wall_closes * atom->radius[i]) continue;
+    if (c.moving && !e.locked && e.calm == 0) continue;
+    // a plug behind the wall: behind a still one it stays, for the place behind a wall is no void whoever stands before it; one that
+    // moves has plugs where granules at rest stand at it now
     const double distance = c.to_wall.norm();
     if (distance == 0) continue;
-    const Vec3 at = vec(atom->x[c.granule]) + c.to_wall;
-    const Vec3 outward = c.to_wall / distance;
+    Vec3 at = vec(atom->x[i]) + c.to_wall, outward = c.to_wall / distance;
+    if (c.moving) {
+      at = observer_.to_frame(at);
+      outward = observer_.turned_to_frame(outward);
+    }
     const auto grid = [&](double x) {
       return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(x / (0.5 * diameter_)))) & 0xfffff;
     };
     const std::uint64_t side = (outward[0] > 0.5) + 2 * (outward[0] < -0.5) + 3 * (outward[1] > 0.5) + 6 * (outward[1] < -0.5);
-    const std::uint64_t place = ((grid(at[0]) << 20 | grid(at[1])) << 20 | grid(at[2])) << 4 | side;
-    char& there = plugged_[static_cast<std::int64_t>(place)];
-    if (there) continue;
-    there = 1;
-    plugs_.push_back({at + plug_radius * outward, plug_radius});
+    const std::int64_t place = static_cast<std::int64_t>(((grid(at[0]) << 20 | grid(at[1])) << 20 | grid(at[2])) << 4 | side);
+    const Sphere plug{at + plug_radius * outward, plug_radius};
+    if (c.moving) {
+      const Sphere* before = moving_plugs_.find(place);
+      moving_plugs[place] = before ? *before : plug;
+      if (before) continue;
+      plugs_changed_ = true;
+      if (surface_) surface_->touch(plug);
+      continue;
+    }
+    char& known = plugged_[place];
+    if (known) continue;
+    known = 1;
+    plugs_.push_back(plug);
     plugs_changed_ = true;
-    if (surface_) surface_->touch(plugs_.back());
+    if (surface_) surface_->touch({observer_.to_frame(plug.centre), plug.radius});
+  }
+  moving_plugs_.for_each([&](std::int64_t place, const Sphere& plug) {
+    if (moving_plugs.contains(place)) return;
+    plugs_changed_ = true;
+    if (surface_) surface_->touch(plug);
+  });
+  moving_plugs_ = std::move(moving_plugs);
+  for (int i = 0; i < owned; ++i) {
+    ShellEntry& e = shell_[i];
+    // between runs a wall may have been taken away; within one, a wall that moves may have left
+    const bool gone = new_run ? there[i] < e.walls : e.wall_moves && there[i] == 0;
+    if (e.locked && gone) waking_.push_back({vec(atom->x[i]), 0.5 * atom->radius[i]});
+    e.walls = touched[i];
+    e.wall_moves = moves[i];
+    e.wall_near = near[i];
   }
 }
 
-void FixSolidCull::wake_where_walls_are_gone() {
-  for (const int i : locked_index_)
-    if (shell_[i].walls < shell_[i].walls_at_locking) waking_.push_back({vec(atom->x[i]), 0.5 * atom->radius[i]});
+std::vector<Vec3> FixSolidCull::accelerations() const {
+  std::vector<Vec3> a(static_cast<std::size_t>(atom->nlocal + atom->nghost), Vec3::Zero());
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (!shell_[i].locked) a[i] = vec(atom->f[i]) / atom->rmass[i];
+  if (rigid())
+    for (std::size_t k = 0; k < locked_index_.size(); ++k) {
+      const ActiveBody& b = active_[locked_slot_[k]];
+      const int i = locked_index_[k];
+      a[i] = b.body->motion.acceleration(b.body->pose.to_world(shell_[i].place), b.force, b.torque);
+    }
+  if (!halo_.needed()) return a;
+  std::vector<double> rows;
+  for (int i = 0; i < atom->nlocal; ++i)
+    rows.insert(rows.end(), {atom->x[i][0], atom->x[i][1], atom->x[i][2], double(atom->tag[i]), a[i][0], a[i][1], a[i][2]});
+  rows = halo_.exchange(rows, 7, contact_reach());
+  FlatMap<std::size_t> row_of;
+  for (std::size_t r = 0; r < rows.size(); r += 7) row_of[static_cast<std::int64_t>(rows[r + 3])] = r;
+  for (int i = atom->nlocal; i < atom->nlocal + atom->nghost; ++i)
+    if (const std::size_t* r = row_of.find(atom->tag[i])) a[i] = vec(&rows[*r + 4]);
+  return a;
 }
 
-std::vector<char> FixSolidCull::find_quiet() {
+bool FixSolidCull::find_calm() {
   const int owned = atom->nlocal;
-  std::vector<char> touching(owned, 0), moving(owned, 0);
+  std::vector<char> touching(owned, 0), moving(owned, 0), loaded(owned, 0), drifting(owned, 0);
+  std::vector<Vec3> around(owned, Vec3::Zero());  // sum of mass times acceleration of what each granule touches
+  std::vector<double> mass(owned, 0.0);
+  const std::vector<Vec3> acceleration = accelerations();
   const LAMMPS_NS::NeighList* list = force->pair->list;
   const auto state = [&](int i) {
     return MovingSphere{vec(atom->x[i]), vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]};
   };
+  struct Pair {
+    int i, j;
+  };
+  std::vector<Pair> between_bodies;
   for (int row = 0; row < list->inum; ++row) {
     const int i = list->ilist[row];
     if (i >= owned) continue;
@@ -117,16 +201,110 @@ std::vector<char> FixSolidCull::find_quiet() {
     for (int k = 0; k < list->numneigh[i]; ++k) {
       const int j = list->firstneigh[i][k] & NEIGHMASK;
       const double reach = (a.radius + atom->radius[j]) * (1 + SolidStateLaw::gap);
-      if ((vec(atom->x[j]) - a.position).squaredNorm() > reach * reach) continue;
+      const double square = (vec(atom->x[j]) - a.position).squaredNorm();
+      if (square > reach * reach) continue;
+      const MovingSphere b = state(j);
+      const double radii = a.radius + b.radius;
+      const bool pressed = square < radii * radii, drifts = !pressed && !solid_state_.still_neighbour(a, b);
+      loaded[i] |= pressed;
+      drifting[i] |= drifts;
+      if (j < owned) {
+        loaded[j] |= pressed;
+        drifting[j] |= drifts;
+      }
       touching[i] = 1;
-      if (j < owned) touching[j] = 1;
-      if (solid_state_.quiet_contact(a, state(j))) continue;
+      around[i] += atom->rmass[j] * acceleration[j];
+      mass[i] += atom->rmass[j];
+      if (j < owned) {
+        touching[j] = 1;
+        around[j] += atom->rmass[i] * acceleration[i];
+        mass[j] += atom->rmass[i];
+      }
+      const bool quiet = solid_state_.quiet_contact(a, b);
+      if (shell_[i].locked && key_of_atom(j)) {
+        between_bodies.push_back({i, j});
+        if (quiet) continue;
+      } else if (quiet) {
+        continue;
+      }
       moving[i] = 1;
       if (j < owned) moving[j] = 1;
     }
   }
-  for (int i = 0; i < owned; ++i) touching[i] = (touching[i] || shell_[i].walls > 0) && !moving[i];
-  return touching;
+  bool candidates = false;
+  for (int i = 0; i < owned; ++i) {
+    ShellEntry& e = shell_[i];
+    if (e.locked) continue;
+    if (e.walls > 0) loaded[i] = 1;
+    bool solid = (touching[i] || e.walls > 0) && !moving[i] && (loaded[i] || !drifting[i]) && (atom->mask[i] & groupbit) && can_be_culled(atom->mask[i]);
+    if (solid && rigid()) {
+      // a wall is a neighbour too; that it is accelerated itself is not known here
+      const double all = mass[i] + (e.walls > 0 ? atom->rmass[i] : 0.0);
+      const Vec3 v = vec(atom->v[i]), frame = around[i] / all;
+      solid = solid_state_.balanced(acceleration[i], frame);
+      const double passed = static_cast<double>(update->ntimestep - e.lock_step) * update->dt;
+      if (solid && (e.calm == 0 || !solid_state_.went_on(v - e.velocity, e.reference, frame, passed))) {
+        e.calm = 0;  // calm begins here, with this motion
+        e.velocity = v;
+        e.reference = frame;
+        e.lock_step = update->ntimestep;
+      }
+    } else if (solid) {
+      solid = solid_state_.at_rest(vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]) &&
+              solid_state_.balanced(acceleration[i], Vec3::Zero());
+    }
+    e.calm = solid ? e.calm + 1 : 0;
+    candidates = candidates || e.calm >= calm_needed(e);
+  }
+  joins_.clear();
+  for (const Pair& p : between_bodies)
+    for (const int end : {p.i, p.j})
+      if (end < owned) shell_[end].calm = moving[end] ? 0 : shell_[end].calm + 1;
+  for (const Pair& p : between_bodies) {
+    const bool long_enough = shell_[p.i].calm >= settings_.calm && (p.j >= owned || shell_[p.j].calm >= settings_.calm);
+    if (!long_enough || moving[p.i] || (p.j < owned && moving[p.j])) continue;
+    const double* x = atom->x[p.i];
+    joins_.insert(joins_.end(), {x[0], x[1], x[2], double(atom->tag[p.i]), double(atom->tag[p.j])});
+  }
+  return candidates;
+}
+
+bool FixSolidCull::can_be_culled(int mask) const { return (mask & movable_) && !(mask & held_) && (!gravity_bit_ || (mask & gravity_bit_)); }
+
+void FixSolidCull::follow_with_surface() {
+  // the surface is drawn in the frame of the largest body, so that a mass that falls or turns as one leaves it as it is
+  if (!rigid() || domain->xperiodic || domain->yperiodic || domain->zperiodic) return;
+  const double enough = drawn_share * settings_.voxel * diameter_;
+  int largest = 0;
+  std::int64_t count = 0;
+  store_->for_each_body([&](int body, const Vec3&, const Vec3&) {
+    const std::int64_t n = bodies_.body(body).mass.count;
+    if (body == observed_) largest = body, count = 2 * n;  // it stays until another one is twice as large
+    if (n > count) largest = body, count = n;
+  });
+  if (!largest) {
+    observed_ = 0;
+    return;
+  }
+  if (largest != observed_) {
+    observed_ = largest;
+    observed_then_ = bodies_.pose(largest);
+    return;
+  }
+  const Pose& now = bodies_.pose(observed_);
+  double way = 0;
+  store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
+    if (body == observed_) way = largest_way(observed_then_, now, lo, hi);
+  });
+  if (way <= enough) return;
+  const Pose before = observer_;
+  const Eigen::Quaterniond turn = now.quaternion() * observed_then_.quaternion().conjugate();
+  observer_ = Pose(now.origin() + turn * (observer_.origin() - observed_then_.origin()), (turn * observer_.quaternion()).normalized());
+  observed_then_ = now;
+  if (halo_.needed()) surface_->touch_all();
+  for (const Sphere& plug : plugs_)
+    for (const Pose* pose : {&before, const_cast<const Pose*>(&observer_)}) surface_->touch({pose->to_frame(plug.centre), plug.radius});
+  plugs_changed_ = plugs_changed_ || !plugs_.empty();
 }
 
 void FixSolidCull::register_with_surface() {
@@ -145,24 +323,45 @@ void FixSolidCull::register_with_surface() {
   };
   for (int i = 0; i < atom->nlocal; ++i) {
     ShellEntry& e = shell_[i];
-    const Sphere s = sphere(i);
+    const Vec3 x = vec(atom->x[i]);
+    const Sphere s{observer_.to_frame(x), atom->radius[i]};
     spheres.push_back(s);
-    Vec3 from = s.centre;
+    Vec3 from = x;
     if (!e.registered || (s.centre - e.registered_at).squaredNorm() > moved * moved) {
       if (e.registered) surface_->touch({e.registered_at, s.radius});
       surface_->touch(s);
-      from = e.registered ? e.registered_at : Vec3(s.centre + Vec3::Constant(diameter_));
+      from = e.registered ? observer_.to_world(e.registered_at) : Vec3(x + Vec3::Constant(diameter_));
       e.registered = true;
       e.registered_at = s.centre;
     }
-    if (shared) share(s.centre, s.radius, from);
+    if (shared) share(x, s.radius, from);
   }
+  // interior granules of bodies that move against the observer
+  store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
+    const Pose& pose = bodies_.pose(body);
+    const Eigen::Quaterniond back = observer_.quaternion().conjugate();
+    const Pose seen(observer_.to_frame(pose.origin()), back * pose.quaternion());
+    const auto then = drawn_.find(body);
+    if (then == drawn_.end()) {
+      drawn_[body] = seen;
+      return;
+    }
+    if (largest_way(then->second, seen, lo, hi) <= moved) return;
+    store_->for_each_in_box(body, lo, hi, [&](const StoredGranule& g) {
+      surface_->touch({then->second.to_world(g.position), g.radius});
+      surface_->touch({seen.to_world(g.position), g.radius});
+    });
+    then->second = seen;
+  });
   if (shared) {
-    store_->for_each([&](const StoredGranule& g) { share(g.position, g.radius, g.position); });
+    store_->for_each([&](const StoredGranule& g) {
+      const Vec3 x = in_world(g);
+      share(x, g.radius, x);
+    });
     rows = halo_.exchange(rows, 7, surface_reach());
     for (std::size_t r = 0; r < rows.size(); r += 7) {
-      const Sphere s{vec(&rows[r]), rows[r + 3]};
-      const Vec3 step = vec(&rows[r + 4]);
+      const Sphere s{observer_.to_frame(vec(&rows[r])), rows[r + 3]};
+      const Vec3 step = observer_.turned_to_frame(vec(&rows[r + 4]));
       spheres.push_back(s);
       if (!step.isZero(0) || !halo_drawn_) {
         surface_->touch({s.centre + step, s.radius});
@@ -175,7 +374,10 @@ void FixSolidCull::register_with_surface() {
   MPI_Allreduce(MPI_IN_PLACE, &drawn_at_last_look_, 1, MPI_INT64_T, MPI_SUM, world);
   around_.build(std::move(spheres), 2 * diameter_);
   if (plugs_changed_) {
-    plug_cells_.build(plugs_, 4 * diameter_);
+    std::vector<Sphere> plugs;
+    for (const Sphere& p : plugs_) plugs.push_back({observer_.to_frame(p.centre), p.radius});
+    moving_plugs_.for_each([&](std::int64_t, const Sphere& p) { plugs.push_back(p); });
+    plug_cells_.build(std::move(plugs), 4 * diameter_);
     plugs_changed_ = false;
   }
 }
@@ -185,8 +387,8 @@ void FixSolidCull::choose() {
   const double depth = settings_.depth * diameter_;
   for (int i = 0; i < atom->nlocal; ++i) {
     ShellEntry& e = shell_[i];
-    if (e.locked || e.calm < settings_.calm) continue;
-    e.nearest_void = surface_->void_within(vec(atom->x[i]), depth, e.nearest_void);
+    if (e.locked || e.calm < calm_needed(e)) continue;
+    e.nearest_void = surface_->void_within(observer_.to_frame(vec(atom->x[i])), depth, e.nearest_void);
     if (!e.nearest_void.none()) {
       e.waited = 0;
       continue;
@@ -200,10 +402,10 @@ void FixSolidCull::find_exposed() {
   const double depth = (settings_.depth - std::min(cover_slack, 0.5 * settings_.depth)) * diameter_;
   for (const int i : locked_index_) {
     ShellEntry& e = shell_[i];
-    const Vec3 x = vec(atom->x[i]);
+    const Vec3 x = observer_.to_frame(vec(atom->x[i]));
     if (!surface_->touched_near(x, depth + closing())) continue;
     e.nearest_void = surface_->void_within(x, depth, e.nearest_void);
-    if (!e.nearest_void.none()) waking_.push_back({x, 0.5 * atom->radius[i]});
+    if (!e.nearest_void.none()) waking_.push_back({vec(atom->x[i]), 0.5 * atom->radius[i]});
   }
   surface_->clear_touched();
 }

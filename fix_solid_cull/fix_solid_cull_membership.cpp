@@ -28,9 +28,11 @@ constexpr double store_gap_in_skins = 2.5;
 // after this share of the atoms came or went, the engine sorts its arrays at once
 constexpr double sort_share = 0.05;
 
-double kinetic_energy(double mass, double radius, const Vec3& v, const Vec3& spin) {
-  return 0.5 * mass * v.squaredNorm() + 0.2 * mass * radius * radius * spin.squaredNorm();
-}
+// a granule that wakes within so many looks was culled too early: it must be calm twice as long the next time, up to 2^most_wakes
+constexpr int soon_in_looks = 20, most_wakes = 1;
+// walls are looked at again when a body has moved by this many skins; what is nearer than that and a margin becomes an atom
+constexpr double wall_check_in_skins = 0.25;
+constexpr double wall_gap_in_skins = 1.5;
 
 }  // namespace
 
@@ -45,10 +47,28 @@ double FixSolidCull::contact_reach() const {
   return 2 * everywhere + neighbor->skin;
 }
 
-GranuleMass FixSolidCull::mass_of(std::int64_t tag) {
-  if (const int* i = index_of_.find(tag)) return {atom->rmass[*i], vec(atom->x[*i]), atom->radius[*i]};
+GranuleMass FixSolidCull::mass_of(std::int64_t tag) const {
   const StoredGranule* g = store_->find(tag);
-  return {g->mass, g->position, g->radius};
+  const int* i = g ? nullptr : index_of_.find(tag);
+  if (!g && !i) {
+    const Arrival& a = *arriving_.find(tag);
+    const Pose &from = bodies_.pose(a.at.body), &to = bodies_.pose(bodies_.body_of(tag));
+    return {a.mass, from == to ? a.at.position : to.to_frame(from.to_world(a.at.position)), a.radius};
+  }
+  GranuleMass m = g ? GranuleMass{g->mass, g->position, g->radius} : GranuleMass{atom->rmass[*i], shell_[*i].place, atom->radius[*i]};
+  const int stands_in = g ? g->body : shell_[*i].body, body = bodies_.body_of(tag);
+  if (body && stands_in != body) {
+    const Pose &from = bodies_.pose(stands_in), &to = bodies_.pose(body);
+    if (from != to) m.position = to.to_frame(from.to_world(m.position));
+  }
+  return m;
+}
+
+MovingGranule FixSolidCull::moving(int i) const {
+  const ShellEntry& e = shell_[i];
+  // a granule that is locked has the motion that it had before
+  const bool now = e.locked && e.lock_step == update->ntimestep;
+  return {atom->rmass[i], atom->radius[i], vec(atom->x[i]), now ? e.velocity : vec(atom->v[i]), now ? e.spin : vec(atom->omega[i])};
 }
 
 std::vector<FixSolidCull::Ball> FixSolidCull::collect_balls() {
@@ -74,46 +94,53 @@ bool FixSolidCull::in_ball(const Vec3& x, double margin) const {
 void FixSolidCull::change_membership() {
   const auto timed = watch_.time(Part::membership);
   balls_ = collect_balls();
+  std::vector<double> keys(waking_bodies_.begin(), waking_bodies_.end());
+  keys = halo_.gather_all(keys);
+  freed_keys_.assign(keys.begin(), keys.end());
+  waking_bodies_.clear();
   const bool all = any_rank(wake_all_);
-  const bool change =
-      any_rank(all || !balls_.empty() || !chosen_.empty() || open_for_insertion_);
+  const bool change = any_rank(all || !balls_.empty() || !freed_keys_.empty() || !chosen_.empty() || !joins_.empty() || open_for_insertion_);
   freed_.clear();
   locked_now_.clear();
   freed_anywhere_.clear();
   locked_anywhere_.clear();
-  if (change) {
+  if (change || comm->nprocs > 1) {
     index_of_.clear();
     index_of_.reserve(static_cast<std::size_t>(atom->nlocal));
     for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
+  }
+  if (change) {
     free_what_wakes(all);
     if (!all) lock_what_was_chosen();
     tell_neighbours();
   }
+  // before contacts thaw: what they are given to must be atoms
   if (change || stored_everywhere_ > 0) share_exterior();
   if (stored_everywhere_ > 0) keep_shell_closed();
   if (change) {
-    std::set<std::pair<int, std::size_t>> cuts;  // which ball took granules from which body
-    for (const std::int64_t tag : freed_) {
-      if (meshes_wanted_)
-        for (std::size_t b = 0; b < balls_.size(); ++b)
-          if ((mass_of(tag).position - balls_[b].centre).norm() <= balls_[b].radius) cuts.emplace(bodies_.body_of(tag), b);
-      bodies_.unlock(tag, mass_of(tag), contacts_);
-    }
-    for (const auto& cut : cuts) {
-      const auto mesh = meshes_.find(cut.first);
-      if (mesh != meshes_.end()) mesh->second.carve({balls_[cut.second].centre, balls_[cut.second].radius});
-    }
     thaw_contacts();
-    bodies_.split(contacts_, [&](std::int64_t tag) { return mass_of(tag); });
+    free_from_bodies();
     freeze_contacts();
-    for (const std::int64_t tag : locked_now_) bodies_.lock(tag, mass_of(tag), contacts_);
+    lock_into_bodies();
+    adopt_places();
+    settle_bodies();
+    freeze_inner_contacts();
+    freeze_histories();
     if (meshes_wanted_) {
       for (const int body : bodies_.split_parents()) meshes_.erase(body);  // made anew from what is left, as is what came off
       update_meshes();
     }
+  }
+  if (change) {
+    count_bodies();
+    if (store_bodies_ > 1) {  // parts that came off face each other now
+      share_exterior();
+      keep_shell_closed();
+    }
     store_what_is_deep();
   }
   if (change || any_rank(shell_reopened_)) publish_atom_counts();
+  hand_over();
   shell_reopened_ = false;
   wake_all_ = false;
   open_for_insertion_ = false;
@@ -121,7 +148,67 @@ void FixSolidCull::change_membership() {
   side_changes_.clear();
   normal_loads_.clear();
   touches_.clear();
+  joins_.clear();
   locked_index_stale_ = true;
+  refresh_locked();
+  if (rigid()) give_velocities();
+  locked_index_stale_ = true;  // what follows sorts the atoms
+}
+
+/// Unlocked granules leave their bodies, which may come apart.
+void FixSolidCull::free_from_bodies() {
+  std::map<std::pair<int, std::size_t>, Vec3> cuts;  // which ball took granules from which body, and its centre in the body's frame
+  for (const std::int64_t tag : freed_) {
+    const int body = bodies_.body_of(tag), i = *index_of_.find(tag);
+    const Vec3 x = bodies_.body(body).pose.to_world(shell_[i].place);
+    if (meshes_wanted_)
+      for (std::size_t b = 0; b < balls_.size(); ++b)
+        if ((x - balls_[b].centre).norm() <= balls_[b].radius)
+          cuts.emplace(std::make_pair(body, b), bodies_.body(body).pose.to_frame(balls_[b].centre));
+    // nothing has moved since it was locked: it goes on as if it had never been; else it starts from its body's motion
+    const bool back = shell_[i].lock_step == update->ntimestep;
+    const Twist twist = bodies_.body(body).twist;
+    set(atom->v[i], back ? shell_[i].velocity : twist.at(x));
+    set(atom->omega[i], back ? shell_[i].spin : twist.spin);
+    MovingGranule given{atom->rmass[i], atom->radius[i], x, vec(atom->v[i]), vec(atom->omega[i])};
+    const double before = kinetic_energy(body);
+    bodies_.unlock(tag, mass_of(tag), contacts_, back && rigid() ? &given : nullptr);
+    const double after = kinetic_energy(body) +
+                         RigidPart::granule(given.mass, given.radius, x, given.velocity, given.spin).kinetic_energy();
+    ledger_.restored(after - before);
+    contacts_.erase(tag);
+  }
+  freed_anywhere_.for_each([&](std::int64_t tag, char) { contacts_.erase(tag); });
+  for (const auto& cut : cuts) {
+    const auto mesh = meshes_.find(cut.first.first);
+    if (mesh != meshes_.end()) mesh->second.carve({cut.second, balls_[cut.first.second].radius});
+  }
+  bodies_.split(contacts_, [&](std::int64_t tag) { return mass_of(tag); },
+                [&](std::int64_t tag, int body) {
+                  if (const StoredGranule* g = store_->find(tag))
+                    store_->move(tag, body, g->position);
+                  else
+                    shell_[*index_of_.find(tag)].body = body;
+                });
+  for (const std::int64_t tag : freed_) {
+    ShellEntry& e = shell_[*index_of_.find(tag)];
+    e.lock_step = -1;
+    e.body = 0;
+  }
+}
+
+void FixSolidCull::lock_into_bodies() {
+  const auto mass = [&](std::int64_t tag) { return mass_of(tag); };
+  for (const std::int64_t tag : locked_now_) {
+    const int i = *index_of_.find(tag);
+    MovingGranule granule = moving(i);
+    if (!rigid()) granule.velocity = granule.spin = Vec3::Zero();  // its momentum goes to the ground
+    const SolidBodies::Place at = bodies_.lock(tag, granule, contacts_, mass);
+    shell_[i].body = at.body;
+    shell_[i].place = at.position;
+  }
+  for (std::size_t r = 0; r < joins_.size(); r += 5)
+    bodies_.join(static_cast<std::int64_t>(joins_[r + 3]), static_cast<std::int64_t>(joins_[r + 4]), mass);
 }
 
 void FixSolidCull::lock(int i) {
@@ -132,32 +219,28 @@ void FixSolidCull::lock(int i) {
   e.excess = 0;
   e.calm = 0;
   e.waited = 0;
-  e.walls_at_locking = e.walls;
   e.lock_step = update->ntimestep;
   e.velocity = vec(atom->v[i]);
   e.spin = vec(atom->omega[i]);
   const double* load = normal_loads_.find(atom->tag[i]);
   e.normal_load = load ? *load : 0;
-  set(atom->v[i], Vec3::Zero());
-  set(atom->omega[i], Vec3::Zero());
+  if (!rigid()) {
+    set(atom->v[i], Vec3::Zero());
+    set(atom->omega[i], Vec3::Zero());
+  }
   atom->mask[i] |= group->bitmask[interface_group_];
   ledger_.locked();
 }
 
 void FixSolidCull::unlock(int i) {
   ShellEntry& e = shell_[i];
-  // nothing has moved since it was locked: it goes on as if it had never been; else it starts from its body's motion
-  if (e.lock_step == update->ntimestep) {
-    set(atom->v[i], e.velocity);
-    set(atom->omega[i], e.spin);
-  }
-  ledger_.restored(kinetic_energy(atom->rmass[i], atom->radius[i], vec(atom->v[i]), vec(atom->omega[i])));
+  const bool soon = update->ntimestep - e.lock_step < soon_in_looks * look_every_;
+  e.wakes = soon ? std::min(e.wakes + 1, most_wakes) : 0;
   e.locked = false;
   e.fresh = false;
   e.excess = 0;
   e.calm = 0;
   e.waited = 0;
-  e.lock_step = -1;
   atom->mask[i] &= ~group->bitmask[interface_group_];
   vector_atom[i] = 0;
 }
@@ -171,15 +254,21 @@ int FixSolidCull::bring_back(std::int64_t tag) {
   e = ShellEntry();
   e.locked = true;
   e.fresh = true;
+  e.body = g.body;
+  e.place = g.position;
   e.load_change = g.load_change;
   e.normal_load = g.normal_load;
   e.lock_step = g.lock_step;
+  e.wakes = g.wakes;
   e.velocity = vec(atom->v[i]);
   e.spin = vec(atom->omega[i]);
+  const SolidBody& body = bodies_.body(g.body);
+  const Vec3 x = body.pose.to_world(g.position);
+  if (g.lock_step != update->ntimestep) set(atom->x[i], nearest_image(x, vec(atom->x[i])));  // else nothing has moved
+  set(atom->v[i], body.twist.at(x));
+  set(atom->omega[i], body.twist.spin);
   e.registered = true;  // the implicit surface does not care who holds a granule
-  e.registered_at = g.position;
-  set(atom->v[i], Vec3::Zero());
-  set(atom->omega[i], Vec3::Zero());
+  e.registered_at = observer_.to_frame(x);
   index_of_[tag] = i;
   return i;
 }
@@ -192,35 +281,45 @@ void FixSolidCull::put_away(int i) {
   std::vector<double> record;
   StoredGranule g;
   records_.pack(i, record, g.layout);
-  g.position = vec(atom->x[i]);
+  g.position = e.place;
+  g.body = e.body;
   g.radius = atom->radius[i];
   g.mass = atom->rmass[i];
   g.tag = atom->tag[i];
   g.type = atom->type[i];
   g.lock_step = e.lock_step;
+  g.wakes = e.wakes;
   g.load_change = e.load_change;
   g.normal_load = e.normal_load;
   store_->add(g, record.data(), static_cast<int>(record.size()));
   ledger_.stored(g);
   double& largest = largest_radius_by_type_[g.type];
   largest = std::max(largest, g.radius);
+  index_of_.erase(g.tag);
   records_.remove(i);
+  if (i < atom->nlocal) index_of_[atom->tag[i]] = i;
 }
 
 void FixSolidCull::free_what_wakes(bool all) {
-  if (!all && balls_.empty()) return;
+  if (!all && balls_.empty() && freed_keys_.empty()) return;
+  std::set<int> whole;  // bodies of this rank that wake as a whole
+  for (const auto& b : bodies_.bodies())
+    if (all || std::find(freed_keys_.begin(), freed_keys_.end(), key_of(b.first)) != freed_keys_.end()) whole.insert(b.first);
   for (int i = 0; i < atom->nlocal; ++i)
-    if (shell_[i].locked && (all || in_ball(vec(atom->x[i]), 0))) {
+    if (shell_[i].locked && (whole.count(shell_[i].body) || in_ball(vec(atom->x[i]), 0))) {
       unlock(i);
       freed_.push_back(atom->tag[i]);
     }
   std::vector<std::int64_t> stored;
-  if (all) store_->for_each([&](const StoredGranule& g) { stored.push_back(g.tag); });
+  if (!whole.empty())
+    store_->for_each([&](const StoredGranule& g) {
+      if (whole.count(g.body)) stored.push_back(g.tag);
+    });
   for (const Ball& b : balls_)
-    if (!all)
-      store_->for_each_in_box(b.centre - Vec3::Constant(b.radius), b.centre + Vec3::Constant(b.radius), [&](const StoredGranule& g) {
-        if ((g.position - b.centre).squaredNorm() <= b.radius * b.radius) stored.push_back(g.tag);
-      });
+    for_each_stored_in_box(b.centre - Vec3::Constant(b.radius), b.centre + Vec3::Constant(b.radius), [&](const StoredGranule& g) {
+      if (!whole.count(g.body) && (nearest_image(in_world(g), b.centre) - b.centre).squaredNorm() <= b.radius * b.radius)
+        stored.push_back(g.tag);
+    });
   std::sort(stored.begin(), stored.end());
   stored.erase(std::unique(stored.begin(), stored.end()), stored.end());
   for (const std::int64_t tag : stored) {
@@ -234,8 +333,12 @@ void FixSolidCull::lock_what_was_chosen() {
   for (const std::int64_t tag : chosen_) {
     const int* i = index_of_.find(tag);
     // since the look it may have left this rank or the simulation, or have been moved, or something wakes beside it
-    if (!i || shell_[*i].locked || in_ball(vec(atom->x[*i]), diameter_) ||
-        !solid_state_.at_rest(vec(atom->v[*i]), vec(atom->omega[*i]), atom->radius[*i]))
+    if (!i || shell_[*i].locked || in_ball(vec(atom->x[*i]), diameter_)) continue;
+    const ShellEntry& e = shell_[*i];
+    const Vec3 v = vec(atom->v[*i]);
+    const double passed = static_cast<double>(update->ntimestep - e.lock_step) * update->dt;
+    if (!(rigid() ? solid_state_.went_on(v - e.velocity, e.reference, e.reference, passed)
+                  : solid_state_.at_rest(v, vec(atom->omega[*i]), atom->radius[*i])))
       continue;
     lock(*i);
     locked_now_.push_back(tag);
@@ -254,87 +357,188 @@ void FixSolidCull::tell_neighbours() {
   };
   tell(freed_, 0);
   tell(locked_now_, 1);
-  rows = halo_.exchange(rows, 5, contact_reach());
+  const double reach = contact_reach();
+  rows = halo_.exchange(rows, 5, reach);
+  const std::vector<double> joins = halo_.exchange(joins_, 5, reach);
+  joins_.insert(joins_.end(), joins.begin(), joins.end());
   for (std::size_t r = 0; r < rows.size(); r += 5)
     (rows[r + 4] == 0 ? freed_anywhere_ : locked_anywhere_)[static_cast<std::int64_t>(rows[r + 3])] = 1;
 }
 
+void FixSolidCull::count_bodies() {
+  std::int64_t counts[2] = {static_cast<std::int64_t>(bodies_.size()), static_cast<std::int64_t>(bodies_.locked())};
+  MPI_Allreduce(MPI_IN_PLACE, counts, 2, MPI_INT64_T, MPI_SUM, world);
+  store_bodies_ = static_cast<int>(counts[0]);
+  locked_everywhere_ = counts[1];
+}
+
 void FixSolidCull::share_exterior() {
-  halo_exterior_.clear();
+  halo_foreign_.clear();
   if (!halo_.needed()) return;
   std::vector<double> rows;
   for (int i = 0; i < atom->nlocal; ++i)
-    if (!shell_[i].locked) rows.insert(rows.end(), {atom->x[i][0], atom->x[i][1], atom->x[i][2], atom->radius[i]});
-  rows = halo_.exchange(rows, 4, contact_reach() + store_gap_in_skins * neighbor->skin);
-  for (std::size_t r = 0; r < rows.size(); r += 4) halo_exterior_.push_back({vec(&rows[r]), rows[r + 3]});
+    if (!shell_[i].locked || store_bodies_ > 1)
+      rows.insert(rows.end(), {atom->x[i][0], atom->x[i][1], atom->x[i][2], atom->radius[i], double(shell_[i].locked ? key_of(shell_[i].body) : 0)});
+  rows = halo_.exchange(rows, 5, contact_reach() + store_gap_in_skins * neighbor->skin + store_slack());
+  for (std::size_t r = 0; r < rows.size(); r += 5) halo_foreign_.push_back({{vec(&rows[r]), rows[r + 3]}, static_cast<int>(rows[r + 4])});
 }
 
 void FixSolidCull::keep_shell_closed() {
   const auto timed = watch_.time(Part::shell);
   const double gap = neighbor->skin;
   std::set<std::int64_t> near;
-  const auto look_around = [&](const Sphere& s) {
-    store_->for_each_near(s, gap, [&](const StoredGranule& g) { near.insert(g.tag); });
+  const auto look_around = [&](const Sphere& s, int body) {
+    for_each_stored_near(s, gap, [&](const StoredGranule& g) { near.insert(g.tag); }, body);
   };
-  for (int i = 0; i < atom->nlocal; ++i)
-    if (!shell_[i].locked) look_around(sphere(i));
-  for (const Sphere& s : halo_exterior_) look_around(s);
-  // what may have moved since the last reneighbouring: moving meshes; at the start of a run any wall
-  const std::vector<WallContacts::Box> boxes = new_run_ ? walls_.triangle_boxes() : walls_.moving_triangle_boxes();
-  const Vec3 reach = Vec3::Constant(store_->largest_radius() + gap);
-  for (const WallContacts::Box& b : boxes)
-    store_->for_each_in_box(b.lo - reach, b.hi + reach, [&](const StoredGranule& g) {
-      if (!near.count(g.tag) && walls_.near({g.position, g.radius}, gap, !new_run_)) near.insert(g.tag);
-    });
-  if (new_run_)
-    store_->for_each([&](const StoredGranule& g) {
-      if (walls_.primitive_near({g.position, g.radius}, gap)) near.insert(g.tag);
-    });
+  // exterior granules, and the shells of other bodies
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!shell_[i].locked)
+      look_around(sphere(i), 0);
+    else if (store_bodies_ > 1)
+      look_around(sphere(i), key_of(shell_[i].body));
+  }
+  for (const Foreign& f : halo_foreign_) look_around(f.sphere, f.body);
+  fetch_near_walls(near);
   if (open_for_insertion_)
     for (int f = 0; f < modify->nfix; ++f) {
       if (std::strncmp(modify->fix[f]->style, "insert/pack", 11) != 0 && std::strncmp(modify->fix[f]->style, "insert/rate", 11) != 0)
         continue;
       const LAMMPS_NS::Region* region = engine::insertion_region(modify->fix[f]);
       if (!region || !region->bboxflag) continue;
-      store_->for_each_in_box(Vec3(region->extent_xlo, region->extent_ylo, region->extent_zlo) - reach,
-                              Vec3(region->extent_xhi, region->extent_yhi, region->extent_zhi) + reach,
-                              [&](const StoredGranule& g) { near.insert(g.tag); });
+      const Vec3 reach = Vec3::Constant(store_->largest_radius() + gap);
+      for_each_stored_in_box(Vec3(region->extent_xlo, region->extent_ylo, region->extent_zlo) - reach,
+                             Vec3(region->extent_xhi, region->extent_yhi, region->extent_zhi) + reach,
+                             [&](const StoredGranule& g) { near.insert(g.tag); });
     }
   for (const std::int64_t tag : near) bring_back(tag);
-  shell_reopened_ = !near.empty();
+  shell_reopened_ = shell_reopened_ || !near.empty();
+}
+
+void FixSolidCull::fetch_near_walls(std::set<std::int64_t>& near) {
+  // walls that move, near any body; all walls, near bodies that have moved since they were last compared and at the start of a run
+  if (new_run_) clear_of_walls_.clear();
+  const double skin = neighbor->skin, gap = wall_gap_in_skins * skin;
+  std::vector<int> moved;
+  store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
+    const Pose& pose = bodies_.pose(body);
+    const auto then = clear_of_walls_.find(body);
+    if (then != clear_of_walls_.end() && largest_way(then->second, pose, lo, hi) < wall_check_in_skins * skin) return;
+    clear_of_walls_[body] = pose;
+    moved.push_back(body);
+  });
+  const Vec3 reach = Vec3::Constant(store_->largest_radius() + gap);
+  walls_.for_each_triangle([&](const WallContacts::Triangle& t) {
+    const auto test = [&](const StoredGranule& g) {
+      if (!near.count(g.tag) && walls_.near(t, {nearest_image(in_world(g), 0.5 * (t.box.lo + t.box.hi)), g.radius}, gap)) near.insert(g.tag);
+    };
+    if (t.moving)
+      for_each_stored_in_box(t.box.lo - reach, t.box.hi + reach, test);
+    else
+      for (const int body : moved) for_each_stored_in_box(t.box.lo - reach, t.box.hi + reach, test, body);
+  });
+  if (moved.empty()) return;
+  store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
+    if (std::find(moved.begin(), moved.end(), body) == moved.end()) return;
+    // a ball around all of them first
+    const Sphere all{bodies_.pose(body).to_world(0.5 * (lo + hi)), 0.5 * (hi - lo).norm() + store_->largest_radius()};
+    if (!walls_.primitive_near(all, gap)) return;
+    store_->for_each_in_box(body, lo, hi, [&](const StoredGranule& g) {
+      if (walls_.primitive_near({in_world(g), g.radius}, gap)) near.insert(g.tag);
+    });
+  });
 }
 
 void FixSolidCull::freeze_contacts() {
-  // contact between two granules that are locked now is left out of the engine's lists from here on
+  // a contact between two granules of one body is left out of the engine's lists from here on
   const auto is_locked = [&](std::int64_t tag) {
     if (const int* i = index_of_.find(tag)) return shell_[*i].locked;
-    return locked_anywhere_.contains(tag) || (ghost_interface_.contains(tag) && !freed_anywhere_.contains(tag));
+    return locked_anywhere_.contains(tag) || (ghost_body_.contains(tag) && !freed_anywhere_.contains(tag));
+  };
+  std::set<std::pair<std::int64_t, std::int64_t>> joined;
+  for (std::size_t r = 0; r < joins_.size(); r += 5) {
+    const std::int64_t a = static_cast<std::int64_t>(joins_[r + 3]), b = static_cast<std::int64_t>(joins_[r + 4]);
+    if (!is_locked(a) || !is_locked(b)) continue;
+    joined.insert({std::min(a, b), std::max(a, b)});
+  }
+  // two bodies that touch stay two, and their contact the engine's, until a granule is locked that touches both, or they are joined
+  const auto freezes = [&](std::int64_t a, std::int64_t b) {
+    return is_locked(b) && (locked_anywhere_.contains(a) || locked_anywhere_.contains(b) || joined.count({std::min(a, b), std::max(a, b)}));
   };
   // the load of a contact that goes inside stays in the balance that the older granule was locked with (invariant I5)
   const auto rebase = [&](int i, std::int64_t partner, const double* history) {
     if (shell_[i].fresh) return;
-    if (const int* j = index_of_.find(partner)) shell_[i].reference -= pair_force_.on_first(i, *j, history);
+    if (const int* j = index_of_.find(partner)) shell_[i].reference -= bodies_.pose(shell_[i].body).turned_to_frame(pair_force_.on_first(i, *j, history));
   };
+  fresh_contacts_.clear();
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!shell_[i].locked) continue;
     const std::int64_t tag = atom->tag[i];
     histories_.for_each_partner(i, [&](int partner, const double* history) {
-      if (!is_locked(partner)) return;
-      if (!contacts_.contains(tag, partner)) contacts_.add(tag, partner, contacts_.width() ? history : nullptr);
+      if (!freezes(tag, partner)) return;
+      if (!contacts_.contains(tag, partner)) {
+        contacts_.add(tag, partner, nullptr);
+        if (contacts_.width()) fresh_contacts_.push_back({tag, partner, std::vector<double>(history, history + contacts_.width())});
+      }
       rebase(i, partner, history);
     });
   }
   for (const Touch& t : touches_)
-    if (is_locked(t.a) && is_locked(t.b) && !contacts_.contains(t.a, t.b)) {
+    if (is_locked(t.a) && freezes(t.a, t.b) && !contacts_.contains(t.a, t.b)) {
       contacts_.add(t.a, t.b, nullptr);
       if (contacts_.width()) continue;  // touching within the gap: no force
       if (const int* a = index_of_.find(t.a)) rebase(*a, t.b, nullptr);
       if (const int* b = index_of_.find(t.b)) rebase(*b, t.a, nullptr);
     }
+  for (const auto& pair : joined)
+    if (!contacts_.contains(pair.first, pair.second)) contacts_.add(pair.first, pair.second, nullptr);
   for (const SideChange& c : side_changes_) {
     const int* i = index_of_.find(c.interface_tag);
-    if (i && shell_[*i].locked && !shell_[*i].fresh && is_locked(c.other_tag)) shell_[*i].reference -= c.force;
+    if (i && shell_[*i].locked && !shell_[*i].fresh && freezes(c.interface_tag, c.other_tag))
+      shell_[*i].reference -= bodies_.pose(shell_[*i].body).turned_to_frame(c.force);
   }
+}
+
+void FixSolidCull::freeze_inner_contacts() {
+  // two bodies that touched have become one: what the engine saw between them goes inside too
+  if (contacts_.width() == 0) return;
+  share_bodies();
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!shell_[i].locked) continue;
+    const std::int64_t tag = atom->tag[i];
+    const int own = key_of(shell_[i].body);
+    histories_.for_each_partner(i, [&](int partner, const double* history) {
+      const int* j = index_of_.find(partner);
+      const int* ghost = j ? nullptr : ghost_body_.find(partner);
+      const int other = j ? (shell_[*j].locked ? key_of(shell_[*j].body) : 0) : ghost ? *ghost : 0;
+      if (other != own || contacts_.contains(tag, partner)) return;
+      contacts_.add(tag, partner, nullptr);
+      fresh_contacts_.push_back({tag, partner, std::vector<double>(history, history + contacts_.width())});
+      for (const int* end : {static_cast<const int*>(&i), j})
+        if (end && !shell_[*end].fresh && j)
+          shell_[*end].reference -= bodies_.pose(shell_[*end].body).turned_to_frame(end == j ? Vec3(-pair_force_.on_first(i, *j, history)) : pair_force_.on_first(i, *j, history));
+    });
+  }
+}
+
+void FixSolidCull::share_bodies() {
+  ghost_body_.clear();
+  if (!halo_.needed()) return;
+  std::vector<double> rows;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (shell_[i].locked)
+      rows.insert(rows.end(), {atom->x[i][0], atom->x[i][1], atom->x[i][2], double(atom->tag[i]), double(key_of(shell_[i].body))});
+  rows = halo_.exchange(rows, 5, contact_reach());
+  for (std::size_t r = 0; r < rows.size(); r += 5) ghost_body_[static_cast<std::int64_t>(rows[r + 3])] = static_cast<int>(rows[r + 4]);
+}
+
+void FixSolidCull::freeze_histories() {
+  // now that each granule has its body: vectors wait in the body's frame
+  for (FreshContact& c : fresh_contacts_) {
+    const int body = bodies_.body_of(c.tag) ? bodies_.body_of(c.tag) : bodies_.body_of(c.partner);
+    contacts_.turn(c.history.data(), bodies_.pose(body).turn().transpose());
+    contacts_.add(c.tag, c.partner, c.history.data());
+  }
+  fresh_contacts_.clear();
 }
 
 void FixSolidCull::thaw_contacts() {
@@ -343,10 +547,12 @@ void FixSolidCull::thaw_contacts() {
     const int* mine = index_of_.find(tag);
     contacts_.for_each(tag, [&](std::int64_t partner, const double* history) {
       if (!history) return;
-      if (mine) given[*mine].push_back({partner, std::vector<double>(history, history + contacts_.width())});
-      if (const int* theirs = index_of_.find(partner)) given[*theirs].push_back({tag, contacts_.turned(history)});
+      const int body = bodies_.body_of(tag) ? bodies_.body_of(tag) : bodies_.body_of(partner);
+      std::vector<double> h(history, history + contacts_.width());
+      contacts_.turn(h.data(), bodies_.pose(body).turn());
+      if (mine) given[*mine].push_back({partner, h});
+      if (const int* theirs = index_of_.find(partner)) given[*theirs].push_back({tag, contacts_.turned(h.data())});
     });
-    contacts_.erase(tag);
   });
   for (const auto& g : given) histories_.give(g.first, g.second);
   thawed_ = !freed_anywhere_.empty();
@@ -359,16 +565,34 @@ void FixSolidCull::store_what_is_deep() {
   if (locked_now_.empty()) return;
 
   std::vector<Sphere> exterior;
-  for (int i = 0; i < atom->nlocal; ++i)
-    if (!shell_[i].locked) exterior.push_back(sphere(i));
-  exterior.insert(exterior.end(), halo_exterior_.begin(), halo_exterior_.end());
-  SphereCells cells;
+  std::vector<Sphere> shells;
+  std::vector<int> shell_body;
+  const auto sort_in = [&](const Sphere& s, int body) {
+    if (!body) {
+      exterior.push_back(s);
+    } else if (store_bodies_ > 1) {
+      shells.push_back(s);
+      shell_body.push_back(body);
+    }
+  };
+  for (int i = 0; i < atom->nlocal; ++i) sort_in(sphere(i), shell_[i].locked ? key_of(shell_[i].body) : 0);
+  for (const Foreign& f : halo_foreign_) sort_in(f.sphere, f.body);
+  SphereCells cells, shell_cells;
   cells.build(std::move(exterior), 2 * diameter_);
+  shell_cells.build(std::move(shells), 2 * diameter_);
   const double gap = store_gap_in_skins * neighbor->skin;
+  const auto near_another_body = [&](int i) {
+    if (store_bodies_ <= 1) return false;
+    const int own = key_of(shell_[i].body);
+    const Sphere s = sphere(i);
+    bool near = shell_cells.any_near(s, gap, [&](std::size_t other) { return shell_body[other] != own; });
+    if (!near) for_each_stored_near(s, gap, [&](const StoredGranule&) { near = true; }, own);
+    return near;
+  };
   for (int i = atom->nlocal - 1; i >= 0; --i) {
     // the highest tag must stay an atom: new atoms are numbered from it
     if (!shell_[i].locked || shell_[i].wall_near || atom->tag[i] == highest_anywhere) continue;
-    if (!cells.any_near(sphere(i), gap)) put_away(i);
+    if (!cells.any_near(sphere(i), gap) && !near_another_body(i)) put_away(i);
   }
 }
 
@@ -391,52 +615,12 @@ void FixSolidCull::publish_atom_counts() {
 }
 
 void FixSolidCull::label_bodies() {
-  const std::map<int, int> number = global_bodies();
-  for (int i = 0; i < atom->nlocal; ++i) {
-    if (!shell_[i].locked) {
-      vector_atom[i] = 0;
-      continue;
-    }
-    const int body = bodies_.body_of(atom->tag[i]);
-    const auto found = number.find(body);
-    vector_atom[i] = found == number.end() ? body : found->second;
-  }
-}
-
-std::map<int, int> FixSolidCull::global_bodies() {
-  std::map<int, int> number;
-  if (comm->nprocs == 1) return number;
-  // a contact across ranks joins the bodies of its two ends: each rank sends its end, all ranks join the same pairs
-  const double ranks = comm->nprocs;
-  std::vector<double> rows;
-  contacts_.for_each_contact([&](std::int64_t low, std::int64_t high, const double*) {
-    const int a = bodies_.body_of(low), b = bodies_.body_of(high);
-    if ((a == 0) == (b == 0)) return;
-    rows.insert(rows.end(), {double(low), double(high), (a ? a : b) * ranks + comm->me});
-  });
-  rows = halo_.gather_all(rows);
-  std::map<std::pair<double, double>, int> first_end;
-  std::map<int, int> parent;
-  const auto root = [&](int key) {
-    while (parent.count(key) && parent[key] != key) key = parent[key];
-    return key;
-  };
-  for (std::size_t r = 0; r < rows.size(); r += 3) {
-    const int key = static_cast<int>(rows[r + 2]);
-    const auto end = first_end.emplace(std::make_pair(rows[r], rows[r + 1]), key);
-    if (end.second) continue;
-    const int a = root(key), b = root(end.first->second);
-    if (a != b) parent[std::max(a, b)] = std::min(a, b);
-  }
-  for (const auto& body : bodies_.bodies()) {
-    const int key = body.first * comm->nprocs + comm->me;
-    number[body.first] = root(key);
-  }
-  return number;
+  for (int i = 0; i < atom->nlocal; ++i) vector_atom[i] = shell_[i].locked ? (comm->nprocs == 1 ? shell_[i].body : key_of(shell_[i].body)) : 0;
 }
 
 void FixSolidCull::restore_all() {
   histories_.bring_up_to_date();
+  halo_.update();
   wake_all_ = true;
   change_membership();
   if (store_->size() != 0 || bodies_.locked() != 0 || contacts_.size() != 0)
@@ -466,9 +650,9 @@ void FixSolidCull::check_inserted() {
   for (int i = 0; i < atom->nlocal + atom->nghost; ++i) {
     if (atom->mask[i] & group->bitmask[interface_group_]) continue;
     const Sphere s = sphere(i);
-    store_->for_each_near(s, neighbor->skin, [&](const StoredGranule& g) {
+    for_each_stored_near(s, neighbor->skin, [&](const StoredGranule& g) {
       near = true;
-      if ((g.position - s.centre).norm() < g.radius + s.radius) overlapping = atom->tag[i];
+      if ((nearest_image(in_world(g), s.centre) - s.centre).norm() < g.radius + s.radius) overlapping = atom->tag[i];
     });
   }
   int everywhere = 0;

@@ -5,7 +5,10 @@
 #include <cstdint>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "flat_map.h"
+#include "sphere.h"
 
 namespace solidcull {
 
@@ -55,6 +58,24 @@ class FrozenContacts {
     return h;
   }
   bool contains(std::int64_t tag, std::int64_t partner) const;
+  /// Which history components are vectors of space: first indices of three in a row. They turn with the body.
+  void set_vectors(std::vector<int> firsts) { vectors_ = std::move(firsts); }
+  const std::vector<int>& vectors() const { return vectors_; }
+  /// A history (width() numbers) after the rotation of space.
+  void turn(double* history, const Eigen::Matrix3d& by) const {
+    for (const int v : vectors_) {
+      const Vec3 turned = by * Vec3(history[v], history[v + 1], history[v + 2]);
+      for (int d = 0; d < 3; ++d) history[v + d] = turned[d];
+    }
+  }
+  /// Turns the histories of the contacts of `tag` with partners for which mine(partner) holds.
+  template <class Mine>
+  void turn(std::int64_t tag, const Eigen::Matrix3d& by, Mine mine) {
+    const int* head = heads_.find(tag);
+    for (int e = head ? *head : none; e != none; e = next(e, tag))
+      if (edges_[e].has_history && mine(edges_[e].low == tag ? edges_[e].high : edges_[e].low))
+        turn(histories_.data() + static_cast<std::size_t>(e) * width(), by);
+  }
   /// Removes all contacts of `tag`.
   void erase(std::int64_t tag);
   std::size_t size() const { return count_; }
@@ -77,6 +98,7 @@ class FrozenContacts {
   void write(int e, std::int64_t tag, const double* history);
 
   std::vector<bool> flips_;
+  std::vector<int> vectors_;
   std::vector<Edge> edges_;
   std::vector<double> histories_;  // width() per edge, as the low tag sees it
   std::vector<int> free_;

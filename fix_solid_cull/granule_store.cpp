@@ -12,14 +12,50 @@ GranuleStore::GranuleStore(double cell) : inverse_cell_(1.0 / cell) {
   if (!(cell > 0) || !std::isfinite(cell)) throw std::invalid_argument("granule store: the cell size must be positive");
 }
 
-void GranuleStore::count_around(const std::array<std::int64_t, 3>& c, int change) {
+void GranuleStore::count_around(Grid& grid, const std::array<std::int64_t, 3>& c, int change) {
   for (std::int64_t i = c[0] - 1; i <= c[0] + 1; ++i)
     for (std::int64_t j = c[1] - 1; j <= c[1] + 1; ++j)
       for (std::int64_t k = c[2] - 1; k <= c[2] + 1; ++k) {
-        Cell& cell = cells_[key(i, j, k)];
+        Cell& cell = grid.cells[key(i, j, k)];
         cell.count_around += change;
-        if (cell.count_around == 0) cells_.erase(key(i, j, k));
+        if (cell.count_around == 0) grid.cells.erase(key(i, j, k));
       }
+}
+
+void GranuleStore::link(int s) {
+  const StoredGranule& granule = slots_[s].granule;
+  Grid& grid = grids_[granule.body];
+  const auto c = cell_of(granule.position);
+  count_around(grid, c, +1);
+  Cell& cell = grid.cells[key(c[0], c[1], c[2])];
+  slots_[s].next = cell.head;
+  cell.head = s;
+  ++cell.count_here;
+  ++grid.granules;
+  grid.lo = grid.lo.cwiseMin(granule.position);
+  grid.hi = grid.hi.cwiseMax(granule.position);
+}
+
+void GranuleStore::unlink(int s) {
+  const StoredGranule& granule = slots_[s].granule;
+  const auto grid = grids_.find(granule.body);
+  const auto c = cell_of(granule.position);
+  Cell& cell = *grid->second.cells.find(key(c[0], c[1], c[2]));
+  int* link = &cell.head;
+  while (*link != s) link = &slots_[*link].next;
+  *link = slots_[s].next;
+  --cell.count_here;
+  count_around(grid->second, c, -1);
+  if (--grid->second.granules == 0) grids_.erase(grid);
+}
+
+void GranuleStore::move(std::int64_t tag, int body, const Vec3& position) {
+  const int* s = slot_of_.find(tag);
+  if (!s) throw std::logic_error("granule " + std::to_string(tag) + " is not in the store");
+  unlink(*s);
+  slots_[*s].granule.body = body;
+  slots_[*s].granule.position = position;
+  link(*s);
 }
 
 void GranuleStore::add(const StoredGranule& granule, const double* record, int length) {
@@ -43,12 +79,8 @@ void GranuleStore::add(const StoredGranule& granule, const double* record, int l
     std::copy(record, record + length, pool.data.begin() + static_cast<std::ptrdiff_t>(offset));
   }
 
-  const auto c = cell_of(granule.position);
-  count_around(c, +1);
-  Cell& cell = cells_[key(c[0], c[1], c[2])];
-  slots_[s] = {granule, offset, length, cell.head};
-  cell.head = s;
-  ++cell.count_here;
+  slots_[s] = {granule, offset, length, none};
+  link(s);
   slot_of_[granule.tag] = s;
   largest_radius_ = std::max(largest_radius_, granule.radius);
 }
@@ -63,13 +95,7 @@ StoredGranule GranuleStore::take(std::int64_t tag, std::vector<double>& record) 
   record.assign(from, from + slot.length);
   pool.free.push_back(slot.offset);
 
-  const auto c = cell_of(slot.granule.position);
-  Cell& cell = *cells_.find(key(c[0], c[1], c[2]));
-  int* link = &cell.head;
-  while (*link != s) link = &slots_[*link].next;
-  *link = slot.next;
-  --cell.count_here;
-  count_around(c, -1);
+  unlink(s);
 
   slot_of_.erase(tag);
   slot.next = first_free_;
@@ -96,7 +122,8 @@ double GranuleStore::mass() const {
 }
 
 std::size_t GranuleStore::memory_bytes() const {
-  std::size_t bytes = slots_.capacity() * sizeof(Slot) + slot_of_.memory_bytes() + cells_.memory_bytes();
+  std::size_t bytes = slots_.capacity() * sizeof(Slot) + slot_of_.memory_bytes();
+  for (const auto& grid : grids_) bytes += sizeof(Grid) + grid.second.cells.memory_bytes();
   for (const Pool& p : pools_) bytes += p.data.capacity() * sizeof(double) + p.free.capacity() * sizeof(std::size_t);
   return bytes;
 }

@@ -1,4 +1,4 @@
-// What went in and out of the store: counts, mass, first moment and energy (invariants I2 and I4). Local to the rank.
+// What went in and out of the store: counts, mass and energy (invariants I2 and I4). Local to the rank.
 #pragma once
 
 #include <array>
@@ -22,11 +22,11 @@ class Ledger {
     book(g, -1);
   }
   void locked() { ++locked_; }
-  /// A granule is free again; its kinetic energy (J) is what the restore added to the system: zero but for a restore in the
-  /// very step of the cull, which gives back what that cull took.
-  void restored(double kinetic_energy) {
+  /// A granule is free again; `energy` (J) is what that added to the kinetic energy of granule and body: zero but for a restore
+  /// in the very step of the cull, which gives back what that cull took.
+  void restored(double energy) {
     ++restored_;
-    energy_ += kinetic_energy;
+    energy_ += energy;
   }
   void carved() { ++carves_; }
 
@@ -35,12 +35,6 @@ class Ledger {
     ExactSum there;
     store.for_each([&](const StoredGranule& g) { there += g.mass; });
     there -= mass_.value();
-    return there.value();
-  }
-  double moment_error(const GranuleStore& store, int dimension) const {
-    ExactSum there;
-    store.for_each([&](const StoredGranule& g) { there += g.mass * g.position[dimension]; });
-    there -= moment_[dimension].value();
     return there.value();
   }
   std::int64_t count_due() const { return in_ - out_; }
@@ -63,14 +57,10 @@ class Ledger {
   }
 
  private:
-  void book(const StoredGranule& g, int sign) {
-    mass_ += sign * g.mass;
-    for (int d = 0; d < 3; ++d) moment_[d] += sign * g.mass * g.position[d];
-  }
+  void book(const StoredGranule& g, int sign) { mass_ += sign * g.mass; }
 
   std::int64_t in_ = 0, out_ = 0, locked_ = 0, restored_ = 0, carves_ = 0;
   ExactSum mass_, energy_;
-  std::array<ExactSum, 3> moment_;
 };
 
 }  // namespace solidcull

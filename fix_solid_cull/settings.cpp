@@ -85,7 +85,10 @@ const std::map<std::string, Reader>& readers() {
          s.carve_radius = v.number(wanted, 0, false);
          s.carve_cap = v.number(wanted, 1, true);
        }},
-      {"motion", [](Values& v, Settings& s) { v.one_of("'fixed'", {{"fixed", [&] { s.motion = Motion::fixed; }}}); }},
+      {"motion",
+       [](Values& v, Settings& s) {
+         v.one_of("'rigid' or 'fixed'", {{"rigid", [&] { s.motion = Motion::rigid; }}, {"fixed", [&] { s.motion = Motion::fixed; }}});
+       }},
       {"walls",
        [](Values& v, Settings& s) {
          v.one_of("'closed' or 'surface'",

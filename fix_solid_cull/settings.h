@@ -7,7 +7,7 @@
 namespace solidcull {
 
 enum class Exterior { live };
-enum class Motion { fixed };
+enum class Motion { rigid, fixed };
 enum class Walls { closed, surface };
 enum class Store { exact };
 enum class Restore { exact };
@@ -22,13 +22,13 @@ struct Settings {
   int every = 0;                 ///< steps between looks; 0: from the deck's own scales, see look_interval()
   double depth = 2.0;            ///< cover, in mean granule diameters
   Exterior exterior = Exterior::live;
-  double speed = 0.02;           ///< solid-state tolerance, fraction of sqrt(g d)
+  double speed = 0.01;           ///< solid-state tolerance, fraction of sqrt(g d)
   int calm = 3;                  ///< looks in a row
   double tolerance_absolute = 3; ///< A of the wake-up law, in granule weights
   double tolerance_relative = 0; ///< R of the wake-up law, in normal loads at locking
   double carve_radius = 2.0;     ///< r0, in mean diameters
   double carve_cap = 4.0;        ///< largest growth of r0
-  Motion motion = Motion::fixed;
+  Motion motion = Motion::rigid;
   Walls walls = Walls::closed;
   Store store = Store::exact;
   Restore restore = Restore::exact;

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "implicit_surface.h"
+#include "pose.h"
 #include "sphere.h"
 
 namespace solidcull {
@@ -13,33 +14,45 @@ struct ShellEntry {
   // interface granules
   bool locked = false;
   bool fresh = false;                     ///< the reference load is taken in this step
-  Vec3 reference = Vec3::Zero();          ///< F_ext at locking, re-based when contacts change sides (N)
-  Vec3 load_change = Vec3::Zero();        ///< F_ext - reference at the last step (N)
+  int body = 0;                           ///< the body in whose frame it stands, on this rank
+  Vec3 place = Vec3::Zero();              ///< in the body's frame (m)
+  Vec3 reference = Vec3::Zero();          ///< F_ext at locking, re-based when contacts change sides; frame of the body (N). Of an
+                                          ///< exterior granule: acceleration of what it touched when calm began (m/s^2)
+  Vec3 load_change = Vec3::Zero();        ///< F_ext - reference at the last step; frame of the body (N)
   double normal_load = 0;                 ///< sum of normal contact forces at locking (N), for the relative tolerance
   double excess = 0;                      ///< largest load change over tolerance since the last wake-up
-  int walls_at_locking = 0;
-  std::int64_t lock_step = -1;
-  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< at locking; given back only if no step has passed
+  std::int64_t lock_step = -1;            ///< of an exterior granule: when calm began
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< at locking, given back only if no step has passed. Of an exterior granule:
+                                                      ///< its velocity when calm began
 
   // all granules
   int walls = 0;                          ///< walls and triangles touched at the last look
+  bool wall_moves = false;                ///< one of them can move
   bool wall_near = true;                  ///< within the skin of a wall; true until a look has seen that it is not
 
   // exterior granules
-  int calm = 0;                           ///< looks in a row in solid state
+  int calm = 0;                           ///< looks in a row in solid state; of an interface granule: at rest against another body
+  int wakes = 0;                          ///< times in a row that it woke soon after it was culled: it must be calm for longer each time
   int waited = 0;                         ///< looks since it could have been culled
   bool registered = false;                ///< known to the implicit surface
   Vec3 registered_at = Vec3::Zero();
   Voxel nearest_void = Voxel::nothing();
 
-  /// What a restart file and another rank must get; the rest is found again by the next look.
-  static constexpr int packed_size = 26;
+  /// What a restart file and another rank must get; the rest is found again by the next look. The body's frame stays behind:
+  /// in_world() first, and the place is given anew.
+  ShellEntry in_world(const Pose& pose) const {
+    ShellEntry e = *this;
+    e.reference = pose.turned_to_world(reference);
+    e.load_change = pose.turned_to_world(load_change);
+    return e;
+  }
+  static constexpr int packed_size = 27;
   void pack(double* to) const {
     const double values[packed_size] = {
         double(locked), double(fresh), reference[0], reference[1], reference[2], load_change[0], load_change[1], load_change[2],
-        normal_load, excess, double(walls_at_locking), double(lock_step), velocity[0], velocity[1], velocity[2], spin[0], spin[1],
+        normal_load, excess, double(wall_moves), double(lock_step), velocity[0], velocity[1], velocity[2], spin[0], spin[1],
         spin[2], double(walls), double(wall_near), double(calm), double(waited), double(registered), registered_at[0],
-        registered_at[1], registered_at[2]};
+        registered_at[1], registered_at[2], double(wakes)};
     for (int k = 0; k < packed_size; ++k) to[k] = values[k];
   }
   static ShellEntry unpack(const double* v) {
@@ -50,7 +63,7 @@ struct ShellEntry {
     e.load_change = Vec3(v[5], v[6], v[7]);
     e.normal_load = v[8];
     e.excess = v[9];
-    e.walls_at_locking = static_cast<int>(v[10]);
+    e.wall_moves = v[10] != 0;
     e.lock_step = static_cast<std::int64_t>(v[11]);
     e.velocity = Vec3(v[12], v[13], v[14]);
     e.spin = Vec3(v[15], v[16], v[17]);
@@ -60,6 +73,7 @@ struct ShellEntry {
     e.waited = static_cast<int>(v[21]);
     e.registered = v[22] != 0;
     e.registered_at = Vec3(v[23], v[24], v[25]);
+    e.wakes = static_cast<int>(v[26]);
     return e;
   }
 };

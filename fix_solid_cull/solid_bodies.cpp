@@ -1,32 +1,53 @@
 #include "solid_bodies.h"
 
 #include <algorithm>
+#include <cmath>
 #include <deque>
 #include <utility>
 
 namespace solidcull {
 
 void MassProperties::add(double m, const Vec3& x, double r, int sign) {
+  if (count == 0) *this = MassProperties{0, x};
+  const Vec3 arm = x - about;
   count += sign;
   mass += sign * m;
-  first += sign * m * x;
-  second += sign * m * x * x.transpose();
+  first += sign * m * arm;
+  second += sign * m * arm * arm.transpose();
   spin += sign * 0.4 * m * r * r;
 }
 
 void MassProperties::add(const MassProperties& other, int sign) {
+  if (count == 0) *this = MassProperties{0, other.about};
+  const Vec3 arm = other.about - about;
   count += sign * other.count;
   mass += sign * other.mass;
-  first += sign * other.first;
-  second += sign * other.second;
+  first += sign * (other.first + other.mass * arm);
+  second += sign * (other.second + other.first * arm.transpose() + arm * other.first.transpose() + other.mass * arm * arm.transpose());
   spin += sign * other.spin;
 }
 
 Eigen::Matrix3d MassProperties::inertia() const {
-  const Vec3 c = centre();
-  const Eigen::Matrix3d about_centre = second - mass * c * c.transpose();
+  const Eigen::Matrix3d about_centre = second - first * first.transpose() / mass;
   return (about_centre.trace() + spin) * Eigen::Matrix3d::Identity() - about_centre;
 }
+
+MassProperties MassProperties::seen_from(const Pose& here, const Pose& there) const {
+  const Eigen::Matrix3d turn = there.turn().transpose() * here.turn();
+  MassProperties p = *this;
+  p.about = there.to_frame(here.to_world(about));
+  p.first = turn * first;
+  p.second = turn * second * turn.transpose();
+  return p;
+}
+
+RigidPart SolidBody::part() const {
+  const Eigen::Matrix3d turn = pose.turn();
+  const Vec3 centre = pose.to_world(mass.centre());
+  return {mass.mass, centre, turn * mass.inertia() * turn.transpose(), twist.at(centre), twist.spin};
+}
+
+FreeAxes SolidBody::free_axes() const { return {!spans[1] && !spans[2], !spans[0] && !spans[2], !spans[0] && !spans[1]}; }
 
 int SolidBodies::root(int body) const {
   while (parent_[body] != body) body = parent_[body] = parent_[parent_[body]];
@@ -38,42 +59,169 @@ int SolidBodies::body_of(std::int64_t tag) const {
   return body ? root(*body) : 0;
 }
 
-int SolidBodies::merge(int a, int b) {
-  if (a == b) return a;
+const Pose& SolidBodies::pose(int number) const {
+  const auto gone = swallowed_.find(number);
+  return gone == swallowed_.end() ? bodies_.at(number).pose : gone->second;
+}
+
+Vec3 SolidBodies::to_image_of(const Vec3& there) const {
+  Vec3 shift = Vec3::Zero();
+  for (int d = 0; d < 3; ++d)
+    if (periods_[d] > 0) shift[d] = -periods_[d] * std::round(there[d] / periods_[d]);
+  return shift;
+}
+
+int SolidBodies::found() {
+  const int number = static_cast<int>(parent_.size());
+  parent_.push_back(number);
+  bodies_[number];
+  return number;
+}
+
+/// The mean acceleration is that of the centre of mass: where the centre is another one now, the velocity that it began with is too.
+void SolidBodies::centre_moved(SolidBody& body, const Vec3& from) {
+  const Vec3 to = body.pose.to_world(body.mass.centre());
+  body.velocity_then += body.twist.spin.cross(to - from);
+}
+
+/// The body's velocity field becomes that of body and part tied together. The mass properties are the caller's.
+void SolidBodies::add(SolidBody& body, const RigidPart& part) {
+  body.changed = true;
+  if (body.mass.count == 0) {
+    body.twist = {part.centre, part.velocity, part.spin};
+    return;
+  }
+  const RigidPart parts[] = {body.part(), part};
+  body.twist = RigidMotion(parts, 2, body.free_axes()).twist();
+}
+
+int SolidBodies::merge(int a, int b, Vec3 shift) {
   // the larger body keeps its number, so that colours in pictures stay
-  if (bodies_[a].count < bodies_[b].count || (bodies_[a].count == bodies_[b].count && a > b)) std::swap(a, b);
-  bodies_[a].add(bodies_[b]);
+  if (bodies_[a].mass.count < bodies_[b].mass.count || (bodies_[a].mass.count == bodies_[b].mass.count && a > b)) {
+    std::swap(a, b);
+    shift = -shift;
+  }
+  SolidBody& kept = bodies_[a];
+  SolidBody& gone = bodies_[b];
+  if (!shift.isZero(0)) {
+    gone.pose.shift(shift);
+    gone.twist.point += shift;
+    for (auto& s : swallowed_)
+      if (root(s.first) == b) s.second.shift(shift);
+  }
+  for (int d = 0; d < 3; ++d) kept.spans[d] = kept.spans[d] || gone.spans[d];
+  add(kept, gone.part());
+  if (kept.felt_known && gone.felt_known) {
+    const double share = gone.mass.mass / (kept.mass.mass + gone.mass.mass);
+    kept.felt += share * (kept.pose.turned_to_frame(gone.pose.turned_to_world(gone.felt)) - kept.felt);
+  }
+  kept.step_then = -1;
+  kept.mass.add(kept.pose == gone.pose ? gone.mass : gone.mass.seen_from(gone.pose, kept.pose));
+  kept.summed = std::max(kept.summed, kept.mass.count);
+  swallowed_[b] = gone.pose;
   bodies_.erase(b);
   parent_[b] = a;
   merges_.emplace_back(a, b);
   return a;
 }
 
-void SolidBodies::lock(std::int64_t tag, const GranuleMass& granule, const FrozenContacts& contacts) {
-  int body = 0;
+int SolidBodies::tie(int a, Vec3& position_in_a, int b, const Vec3& position_in_b) {
+  const Vec3 shift = to_image_of(position_in_b - position_in_a);
+  if (a == b) {
+    for (int d = 0; d < 3; ++d)
+      if (shift[d] != 0 && !bodies_[a].spans[d]) bodies_[a].spans[d] = bodies_[a].changed = true;
+    return a;
+  }
+  const int kept = merge(a, b, shift);
+  if (kept != a) position_in_a -= shift;
+  return kept;
+}
+
+SolidBodies::Place SolidBodies::lock(std::int64_t tag, const MovingGranule& granule, const FrozenContacts& contacts,
+                                     const MassOf& mass_of) {
+  int number = 0;
+  Vec3 position = granule.position;
+  const auto join = [&](int body) {
+    SolidBody& b = bodies_[body];
+    const bool first = b.mass.count == 0;
+    const Vec3 before = first ? Vec3(Vec3::Zero()) : b.pose.to_world(b.mass.centre());
+    add(b, RigidPart::granule(granule.mass, granule.radius, position, granule.velocity, granule.spin));
+    b.mass.add(granule.mass, b.pose.to_frame(position), granule.radius);
+    b.summed = std::max(b.summed, b.mass.count);
+    if (!first) centre_moved(b, before);
+    member_[tag] = number = body;
+  };
   contacts.for_each_partner(tag, [&](std::int64_t partner) {
     const int theirs = body_of(partner);
-    if (theirs) body = body ? merge(body, theirs) : theirs;
+    if (!theirs) return;
+    const Vec3 there = bodies_[theirs].pose.to_world(mass_of(partner).position);
+    if (!number) {
+      position -= to_image_of(there - position);
+      join(theirs);
+    } else {
+      number = tie(number, position, theirs, there);
+    }
   });
-  if (!body) {
-    body = static_cast<int>(parent_.size());
-    parent_.push_back(body);
-  }
-  member_[tag] = body;
-  bodies_[body].add(granule.mass, granule.position, granule.radius);
+  if (!number) join(found());
+  return {number, bodies_[number].pose.to_frame(position)};
 }
 
-void SolidBodies::unlock(std::int64_t tag, const GranuleMass& granule, const FrozenContacts& contacts) {
-  const int body = body_of(tag);
-  if (!body) return;
+void SolidBodies::join(std::int64_t a, std::int64_t b, const MassOf& mass_of) {
+  const int of_a = body_of(a), of_b = body_of(b);
+  if (!of_a || !of_b) return;
+  Vec3 in_a = bodies_[of_a].pose.to_world(mass_of(a).position);
+  tie(of_a, in_a, of_b, bodies_[of_b].pose.to_world(mass_of(b).position));
+}
+
+void SolidBodies::unlock(std::int64_t tag, const GranuleMass& granule, const FrozenContacts& contacts, const MovingGranule* given) {
+  const int number = body_of(tag);
+  if (!number) return;
   member_.erase(tag);
-  MassProperties& p = bodies_[body];
-  p.add(granule.mass, granule.position, granule.radius, -1);
-  if (p.count == 0) bodies_.erase(body);
   contacts.for_each_partner(tag, [&](std::int64_t partner) { cut_.push_back(partner); });
+  SolidBody& body = bodies_[number];
+  body.changed = true;
+  const Vec3 before = body.pose.to_world(body.mass.centre());
+  body.mass.add(granule.mass, granule.position, granule.radius, -1);
+  if (body.mass.count == 0) {
+    bodies_.erase(number);
+    return;
+  }
+  centre_moved(body, before);
+  if (!given) return;
+  // the difference to the body's own field stays with the body
+  RigidPart rest = body.part();
+  const Vec3 own_velocity = body.twist.at(given->position), own_spin = body.twist.spin;
+  const RigidPart difference =
+      RigidPart::granule(given->mass, given->radius, given->position, own_velocity - given->velocity, own_spin - given->spin);
+  const Vec3 momentum = difference.mass * difference.velocity;
+  const Vec3 turning = difference.angular_momentum(rest.centre);
+  RigidMotion motion(&rest, 1, body.free_axes());
+  motion.kick(momentum, turning, 1.0);
+  body.twist = motion.twist();
 }
 
-std::vector<int> SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of) {
+void SolidBodies::sum_anew(int number, std::int64_t member, const FrozenContacts& contacts, const MassOf& mass_of) {
+  // what was added and taken away leaves rounding behind, which would grow against a body that shrinks
+  std::vector<std::int64_t> reached = {member};
+  FlatMap<char> seen;
+  seen[member] = 1;
+  for (std::size_t at = 0; at < reached.size(); ++at)
+    contacts.for_each_partner(reached[at], [&](std::int64_t partner) {
+      if (!member_.contains(partner) || seen.contains(partner)) return;
+      seen[partner] = 1;
+      reached.push_back(partner);
+    });
+  MassProperties sum;
+  for (const std::int64_t tag : reached) {
+    const GranuleMass g = mass_of(tag);
+    sum.add(g.mass, g.position, g.radius);
+  }
+  bodies_[number].mass = sum;
+  bodies_[number].summed = sum.count;
+}
+
+void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
+                        const std::function<void(std::int64_t, int)>& moved) {
   struct Search {
     std::vector<std::int64_t> reached;
     std::size_t next = 0;
@@ -85,7 +233,6 @@ std::vector<int> SolidBodies::split(const FrozenContacts& contacts, const MassOf
   cut_.clear();
 
   split_parents_.clear();
-  std::vector<int> born;
   for (auto& [body, tags] : sources) {
     std::sort(tags.begin(), tags.end());
     tags.erase(std::unique(tags.begin(), tags.end()), tags.end());
@@ -136,21 +283,33 @@ std::vector<int> SolidBodies::split(const FrozenContacts& contacts, const MassOf
       }
       // this part is closed and others are still growing: it has come off
       --growing;
-      const int fresh = static_cast<int>(parent_.size());
-      parent_.push_back(fresh);
       MassProperties part;
       for (const std::int64_t tag : mine.reached) {
-        member_[tag] = fresh;
         const GranuleMass g = mass_of(tag);
         part.add(g.mass, g.position, g.radius);
       }
-      bodies_[body].add(part, -1);
-      bodies_[fresh] = part;
-      born.push_back(fresh);
+      const int fresh = found();
+      SolidBody& off = bodies_[fresh];
+      SolidBody& rest = bodies_[body];
+      off = rest;  // same frame, same velocity field, same load at locking
+      off.mass = part;
+      off.summed = part.count;
+      off.step_then = -1;
+      rest.mass.add(part, -1);
+      rest.step_then = -1;
+      off.changed = rest.changed = true;
+      for (const std::int64_t tag : mine.reached) {
+        member_[tag] = fresh;
+        moved(tag, fresh);
+      }
       split_parents_.push_back(body);
     }
+    for (const std::int64_t tag : tags) {
+      const int left = body_of(tag);
+      const SolidBody& b = bodies_.at(left);
+      if (2 * b.mass.count < b.summed) sum_anew(left, tag, contacts, mass_of);
+    }
   }
-  return born;
 }
 
 std::vector<std::pair<int, int>> SolidBodies::take_merges() { return std::exchange(merges_, {}); }

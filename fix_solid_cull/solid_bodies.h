@@ -9,53 +9,103 @@
 
 #include "flat_map.h"
 #include "frozen_contacts.h"
+#include "pose.h"
+#include "rigid_motion.h"
 #include "sphere.h"
 
 namespace solidcull {
 
-/// Sums over granules that add and subtract exactly as granules come and go. SI units, about the world's origin.
+/// Sums over granules that are added and taken away as granules come and go. SI units, body frame, about a point in the body, so
+/// that nothing is lost to a far origin.
 struct MassProperties {
   std::int64_t count = 0;
+  Vec3 about = Vec3::Zero();                          ///< the point: where the first granule was (m)
   double mass = 0;                                    ///< kg
-  Vec3 first = Vec3::Zero();                          ///< sum of m x
-  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();   ///< sum of m x x^T
+  Vec3 first = Vec3::Zero();                          ///< sum of m (x - about)
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();   ///< sum of m (x - about) (x - about)^T
   double spin = 0;                                    ///< sum of 2/5 m r^2, each granule's own inertia
 
   void add(double m, const Vec3& x, double r, int sign = 1);
   void add(const MassProperties& other, int sign = 1);
-  Vec3 centre() const { return first / mass; }        ///< m; undefined for no mass
-  Eigen::Matrix3d inertia() const;                    ///< about the centre of mass, kg m^2
+  Vec3 centre() const { return about + first / mass; }   ///< m; undefined for no mass
+  Eigen::Matrix3d inertia() const;                       ///< about the centre of mass, kg m^2
+  MassProperties seen_from(const Pose& here, const Pose& there) const;  ///< the same granules in another frame
 };
 
+/// A locked granule, in the frame of its body.
 struct GranuleMass {
   double mass;
   Vec3 position;
   double radius;
 };
 
-/// Which locked granule belongs to which body. Bodies are numbered from 1; numbers are not used again. Local to the rank: a body
-/// that spans ranks has a number on each, joined by unite_across (the adapter's, collective).
+/// A granule that is to be locked, or is given back with this motion. World frame.
+struct MovingGranule {
+  double mass, radius;
+  Vec3 position, velocity, spin;
+};
+
+struct SolidBody {
+  Pose pose;
+  MassProperties mass;           ///< frame of the body; of this rank's part
+  Twist twist;                   ///< its velocity field
+  RigidMotion motion;            ///< of the whole body, over all ranks; current after the adapter has settled it
+  bool changed = true;           ///< since its motion was last settled
+  bool spanned = false;          ///< a part of a body over several ranks when its motion was last settled
+  std::array<bool, 3> spans{};   ///< tied to its own periodic image in these directions
+  std::int64_t summed = 0;       ///< count when the sums were last made from scratch
+  // wake-up (DESIGN section 8)
+  Vec3 felt = Vec3::Zero();      ///< effective gravity at locking, frame of the body (m/s^2)
+  bool felt_known = false;
+  Vec3 velocity_then = Vec3::Zero();  ///< of the centre, when the window of the mean acceleration began (m/s)
+  std::int64_t step_then = -1;
+  Vec3 acceleration = Vec3::Zero();   ///< mean over the last window (m/s^2)
+
+  RigidPart part() const;        ///< this rank's part, world frame
+  FreeAxes free_axes() const;
+};
+
+/// Which locked granule belongs to which body, and how the bodies move. Bodies are numbered from 1; numbers are not used again.
+/// Local to the rank: a body that spans ranks has a number on each; all its parts share one motion, which the adapter unites.
 class SolidBodies {
  public:
-  /// What split() must know of a granule, by tag.
+  /// Mass and place of a locked granule, by tag, in the frame of its present body.
   using MassOf = std::function<GranuleMass(std::int64_t)>;
 
+  /// Edges of the periodic box, 0 where it is not periodic (m).
+  void set_periods(const Vec3& periods) { periods_ = periods; }
+
   /// A granule is locked: it joins the bodies of its frozen contacts (which merge if they were several), or founds one.
-  void lock(std::int64_t tag, const GranuleMass& granule, const FrozenContacts& contacts);
+  /// Momentum and angular momentum are kept.
+  struct Place {
+    int body = 0;
+    Vec3 position = Vec3::Zero();  ///< frame of the body (m)
+  };
+  Place lock(std::int64_t tag, const MovingGranule& granule, const FrozenContacts& contacts, const MassOf& mass_of);
 
-  /// A granule is unlocked. Call before its contacts are erased; afterwards call split() once for all that were unlocked together.
-  void unlock(std::int64_t tag, const GranuleMass& granule, const FrozenContacts& contacts);
+  /// Two locked granules are tied together by a contact that is frozen now: their bodies merge if they were two.
+  void join(std::int64_t a, std::int64_t b, const MassOf& mass_of);
 
-  /// Bodies that came apart through the unlock() calls since the last split() become several. Searches all cut edges at once and
-  /// stops when one search is left, so its cost goes with the smaller parts. Returns the numbers of the new bodies.
-  std::vector<int> split(const FrozenContacts& contacts, const MassOf& mass_of);
+  /// A granule is unlocked and goes on with the body's own velocity field: the body's motion does not change (paper: it "chips off
+  /// without affecting the momentum"). `given`: the granule goes on with a motion of its own instead, and the body keeps the rest
+  /// of the momentum. Call before its contacts are erased; afterwards call split() once for all that were unlocked together.
+  void unlock(std::int64_t tag, const GranuleMass& granule, const FrozenContacts& contacts, const MovingGranule* given = nullptr);
+
+  /// Bodies that came apart through the unlock() calls since the last split() become several, each with the velocity field that
+  /// they had. Searches all cut edges at once and stops when one search is left, so its cost goes with the smaller parts. Calls
+  /// moved(tag, new body) for each granule of a part that came off.
+  void split(const FrozenContacts& contacts, const MassOf& mass_of, const std::function<void(std::int64_t, int)>& moved);
 
   /// Bodies that lost a part in the last split().
   const std::vector<int>& split_parents() const { return split_parents_; }
 
   int body_of(std::int64_t tag) const;                 ///< 0 if not locked on this rank
-  const MassProperties& properties(int body) const { return bodies_.at(body); }
-  const std::map<int, MassProperties>& bodies() const { return bodies_; }
+  SolidBody& body(int number) { return bodies_.at(number); }
+  const SolidBody& body(int number) const { return bodies_.at(number); }
+  /// Frame of a body, or of one that was swallowed and whose granules have not been moved yet.
+  const Pose& pose(int number) const;
+  std::map<int, SolidBody>& bodies() { return bodies_; }
+  const std::map<int, SolidBody>& bodies() const { return bodies_; }
   std::size_t size() const { return bodies_.size(); }
   std::size_t locked() const { return member_.size(); }
   template <class Visit>
@@ -63,16 +113,28 @@ class SolidBodies {
     member_.for_each([&](std::int64_t tag, int body) { visit(tag, root(body)); });
   }
 
+  /// Swallowed bodies with the frames that they had; their granules' places must be moved to the frames of root(). Then forget them.
+  const std::map<int, Pose>& swallowed() const { return swallowed_; }
+  int root(int body) const;
+  void forget_swallowed() { swallowed_.clear(); }
+
   /// Pairs (kept, swallowed) of the merges since the last call, in their order: what happened to the interface meshes.
   std::vector<std::pair<int, int>> take_merges();
 
  private:
-  int root(int body) const;
-  int merge(int a, int b);
+  int found();
+  int merge(int a, int b, Vec3 shift);
+  int tie(int a, Vec3& position_in_a, int b, const Vec3& position_in_b);
+  static void add(SolidBody& body, const RigidPart& part);
+  static void centre_moved(SolidBody& body, const Vec3& from);
+  Vec3 to_image_of(const Vec3& there) const;  // shift that brings a distance to its shortest image
+  void sum_anew(int number, std::int64_t member, const FrozenContacts& contacts, const MassOf& mass_of);
 
+  Vec3 periods_ = Vec3::Zero();
   FlatMap<int> member_;                    // tag -> body, to be resolved by root()
   mutable std::vector<int> parent_{0};     // union-find over body numbers; 0 is no body
-  std::map<int, MassProperties> bodies_;   // living bodies only
+  std::map<int, SolidBody> bodies_;        // living bodies only
+  std::map<int, Pose> swallowed_;
   std::vector<std::int64_t> cut_;          // locked neighbours of unlocked granules
   std::vector<std::pair<int, int>> merges_;
   std::vector<int> split_parents_;

@@ -22,18 +22,30 @@ struct SolidStateLaw {
   double gravity;                   ///< |g| in m/s^2
   int looks;                        ///< looks in a row
   static constexpr double gap = 0.01;                 ///< touching within this share of the radii's sum counts as contact
+  static constexpr double drift_share = 0.05;         ///< of `speed`, for granules without a loaded contact
   static constexpr double out_of_balance_share = 0.25; ///< of the wake-up tolerance A
 
   bool quiet_contact(const MovingSphere& a, const MovingSphere& b) const {
     return contact_velocity(a, b).squaredNorm() < speed * speed;
   }
+  /// The same for granules that nothing presses together: no friction stops what drifts apart, so it must hardly do so at all.
+  bool still_neighbour(const MovingSphere& a, const MovingSphere& b) const {
+    return contact_velocity(a, b).squaredNorm() < drift_share * drift_share * speed * speed;
+  }
   /// A fixed body rests in the world: granule at rest in translation and at its surface.
   bool at_rest(const Vec3& velocity, const Vec3& spin, double radius) const {
     return velocity.squaredNorm() < speed * speed && spin.squaredNorm() * radius * radius < speed * speed;
   }
-  bool balanced(const Vec3& total_force, double mass) const {
-    const double limit = force * mass * gravity;
-    return total_force.squaredNorm() < limit * limit;
+  /// Since calm began it has kept its velocity, or changed it as its neighbours' acceleration of then makes it: nothing has struck it,
+  /// and the frame in which it rests is not shaken.
+  bool went_on(const Vec3& velocity_change, const Vec3& acceleration_then, const Vec3& acceleration_now, double seconds) const {
+    return balanced(acceleration_now, acceleration_then) &&
+           (velocity_change.squaredNorm() < speed * speed || (velocity_change - seconds * acceleration_then).squaredNorm() < speed * speed);
+  }
+  /// In balance in the frame that moves with its neighbours: its acceleration against theirs (m/s^2).
+  bool balanced(const Vec3& acceleration, const Vec3& of_neighbours) const {
+    const double limit = force * gravity;
+    return (acceleration - of_neighbours).squaredNorm() < limit * limit;
   }
 };
 

@@ -55,10 +55,15 @@ class SphereCells {
 
   /// Whether any sphere's surface is closer than gap to the surface of s.
   bool any_near(const Sphere& s, double gap) const {
+    return any_near(s, gap, [](std::size_t) { return true; });
+  }
+  /// The same among those for which counts(index) holds.
+  template <class Counts>
+  bool any_near(const Sphere& s, double gap, Counts counts) const {
     const Vec3 reach = Vec3::Constant(s.radius + gap + largest_);
-    return !for_each_in_box(s.centre - reach, s.centre + reach, [&](std::size_t, const Sphere& other) {
+    return !for_each_in_box(s.centre - reach, s.centre + reach, [&](std::size_t index, const Sphere& other) {
       const double touch = s.radius + other.radius + gap;
-      return touch <= 0 || (other.centre - s.centre).squaredNorm() >= touch * touch;
+      return touch <= 0 || (other.centre - s.centre).squaredNorm() >= touch * touch || !counts(index);
     });
   }
 

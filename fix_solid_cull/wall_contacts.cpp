@@ -81,47 +81,35 @@ bool WallContacts::primitive_near(const Sphere& s, double gap) const {
   });
 }
 
-bool WallContacts::mesh_near(TriMesh* mesh, const Sphere& s, double gap) const {
+bool WallContacts::near(const Triangle& t, const Sphere& s, double gap) const {
+  const Vec3 outside = (t.box.lo - s.centre).cwiseMax(s.centre - t.box.hi).cwiseMax(0.0);
+  const double reach = s.radius + gap;
+  if (reach < 0 || outside.squaredNorm() > reach * reach) return false;
   double x[3] = {s.centre[0], s.centre[1], s.centre[2]}, to_wall[3];
-  const int triangles = mesh->sizeLocal() + mesh->sizeGhost();
-  for (int t = 0; t < triangles; ++t) {
-    const Box box = box_of(mesh, t);
-    const Vec3 outside = (box.lo - s.centre).cwiseMax(s.centre - box.hi).cwiseMax(0.0);
-    const double reach = s.radius + gap;
-    if (reach < 0 || outside.squaredNorm() > reach * reach) continue;
-    int side = 0;
-    if (mesh->resolveTriSphereContact(-1, t, s.radius, x, to_wall, side) < gap) return true;
-  }
-  return false;
+  int side = 0;
+  return t.mesh->resolveTriSphereContact(-1, t.index, s.radius, x, to_wall, side) < gap;
 }
 
-bool WallContacts::near(const Sphere& s, double gap, bool moving_only) const {
-  if (!moving_only && primitive_near(s, gap)) return true;
+void WallContacts::list(std::vector<Triangle>& all) const {
   for (FixWallGran* wall : walls_) {
     if (!wall->is_mesh_wall()) continue;
     for (int m = 0; m < wall->n_meshes(); ++m) {
       TriMesh* mesh = wall->mesh_list()[m]->triMesh();
-      if ((!moving_only || mesh->isMoving()) && mesh_near(mesh, s, gap)) return true;
-    }
-  }
-  return false;
-}
-
-std::vector<WallContacts::Box> WallContacts::boxes(bool moving_only) const {
-  std::vector<Box> all;
-  for (FixWallGran* wall : walls_) {
-    if (!wall->is_mesh_wall()) continue;
-    for (int m = 0; m < wall->n_meshes(); ++m) {
-      TriMesh* mesh = wall->mesh_list()[m]->triMesh();
-      if (moving_only && !mesh->isMoving()) continue;
+      const bool moving = mesh->isMoving();
       const int triangles = mesh->sizeLocal() + mesh->sizeGhost();
-      for (int t = 0; t < triangles; ++t) all.push_back(box_of(mesh, t));
+      for (int t = 0; t < triangles; ++t) all.push_back({mesh, t, box_of(mesh, t), moving});
     }
   }
+}
+
+std::vector<std::string> WallContacts::names() const {
+  std::vector<std::string> all;
+  for (FixWallGran* wall : walls_) {
+    all.emplace_back(wall->id);
+    for (int m = 0; wall->is_mesh_wall() && m < wall->n_meshes(); ++m) all.emplace_back(wall->mesh_list()[m]->id);
+  }
+  std::sort(all.begin(), all.end());
   return all;
 }
-
-std::vector<WallContacts::Box> WallContacts::moving_triangle_boxes() const { return boxes(true); }
-std::vector<WallContacts::Box> WallContacts::triangle_boxes() const { return boxes(false); }
 
 }  // namespace solidcull

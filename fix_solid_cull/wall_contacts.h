@@ -33,22 +33,31 @@ class WallContacts : protected LAMMPS_NS::Pointers {
   /// All granules near a wall. Valid while neighbour lists are.
   std::vector<WallContact> find() const;
 
-  /// A sphere that is no atom: is it closer than `gap` to any wall (`moving_only`: to any that can move)? Walks all triangles:
-  /// for few spheres, or give a box test first through triangle_boxes.
-  bool near(const Sphere& s, double gap, bool moving_only) const;
-
   struct Box {
     Vec3 lo, hi;
   };
-  /// Boxes around the triangles of the meshes that can move, on this rank.
-  std::vector<Box> moving_triangle_boxes() const;
-  /// Boxes around all triangles of the meshes on this rank.
-  std::vector<Box> triangle_boxes() const;
+  struct Triangle {
+    LAMMPS_NS::TriMesh* mesh;
+    int index;
+    Box box;      ///< around its corners
+    bool moving;  ///< the mesh can move
+  };
+  /// Calls visit(triangle) for each triangle of a mesh wall on this rank.
+  template <class Visit>
+  void for_each_triangle(Visit visit) const {
+    std::vector<Triangle> all;
+    list(all);
+    for (const Triangle& t : all) visit(t);
+  }
+  /// A sphere that is no atom: is it closer than `gap` to the triangle, or to any primitive wall?
+  bool near(const Triangle& t, const Sphere& s, double gap) const;
   bool primitive_near(const Sphere& s, double gap) const;
 
+  /// IDs of the walls and their meshes, sorted: to see that one has gone.
+  std::vector<std::string> names() const;
+
  private:
-  std::vector<Box> boxes(bool moving_only) const;
-  bool mesh_near(LAMMPS_NS::TriMesh* mesh, const Sphere& s, double gap) const;
+  void list(std::vector<Triangle>& all) const;
 
   std::vector<LAMMPS_NS::FixWallGran*> walls_;
 };

@@ -12,6 +12,7 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/tools/Composite.h>
+#include <openvdb/tools/GridTransformer.h>
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <openvdb/tools/ParticlesToLevelSet.h>
@@ -178,6 +179,15 @@ FloatGrid::Ptr ball(const Sphere& s, double voxel) {
                                                          static_cast<float>(voxel), band);
 }
 
+/// Voxels of the body's frame seen from the world; OpenVDB's matrices act on row vectors.
+openvdb::math::Transform::Ptr transform(double voxel, const Pose& pose) {
+  openvdb::Mat4R m = openvdb::Mat4R::identity();
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column) m(row, column) = voxel * pose.turn()(column, row);
+  for (int d = 0; d < 3; ++d) m(3, d) = pose.origin()[d];
+  return openvdb::math::Transform::createLinearTransform(m);
+}
+
 void check(const Sphere& s, const char* what) {
   if (s.centre.allFinite() && std::isfinite(s.radius) && s.radius > 0) return;
   throw std::invalid_argument(std::string("InterfaceMesh: ") + what + " at (" + std::to_string(s.centre.x()) + ", " +
@@ -194,7 +204,8 @@ struct InterfaceMesh::Impl {
   using Operation = std::variant<Addition, Sphere, std::unique_ptr<Impl>>;  // add, carve, merge
 
   double voxel, closing;
-  FloatGrid::Ptr stored;
+  Pose pose;
+  FloatGrid::Ptr stored;  // its own transform is the voxel's scale alone: the body's frame
   std::vector<Operation> queue;
   std::size_t queued_spheres = 0;
   std::size_t leaves_when_pruned = 0;
@@ -317,6 +328,9 @@ void InterfaceMesh::add(const std::vector<Sphere>& granules, const std::vector<S
   impl_->enqueue(Impl::Addition{granules, context}, granules.size() + context.size());
 }
 
+void InterfaceMesh::set_pose(const Pose& pose) { impl_->pose = pose; }
+const Pose& InterfaceMesh::pose() const { return impl_->pose; }
+
 void InterfaceMesh::carve(const Sphere& ball) {
   check(ball, "a carving ball");
   impl_->enqueue(ball, 1);
@@ -329,6 +343,18 @@ void InterfaceMesh::merge(InterfaceMesh&& other) {
                                 " cannot join one with voxel " + std::to_string(impl_->voxel));
   auto emptied = std::make_unique<Impl>(other.impl_->voxel, other.impl_->closing);
   std::swap(emptied, other.impl_);
+  other.impl_->pose = emptied->pose;
+  if (emptied->pose != impl_->pose) {
+    // seen from this frame: turn(here)^-1 turn(there), origins likewise
+    const Pose seen(impl_->pose.to_frame(emptied->pose.origin()), impl_->pose.quaternion().conjugate() * emptied->pose.quaternion());
+    const auto there = emptied->grid().copy();
+    there->setTransform(transform(impl_->voxel, seen));
+    auto here = std::make_unique<Impl>(impl_->voxel, impl_->closing);
+    // doResampleToMatch and not resampleToMatch, which makes level sets anew from triangles: cavities would be filled
+    openvdb::util::NullInterrupter interrupter;
+    openvdb::tools::doResampleToMatch<openvdb::tools::BoxSampler>(*there, *here->stored, interrupter);
+    emptied = std::move(here);
+  }
   const std::size_t spheres = emptied->queued_spheres;
   impl_->enqueue(std::move(emptied), spheres);
 }
@@ -343,10 +369,10 @@ bool InterfaceMesh::empty() const {
 
 bool InterfaceMesh::inside(const Vec3& p) const { return signed_distance(p) < 0.0; }
 
-double InterfaceMesh::signed_distance(const Vec3& p) const { return impl_->value_at(impl_->in_voxels(p)); }
+double InterfaceMesh::signed_distance(const Vec3& p) const { return impl_->value_at(impl_->in_voxels(impl_->pose.to_frame(p))); }
 
 Vec3 InterfaceMesh::normal(const Vec3& p) const {
-  const openvdb::Vec3d at = impl_->in_voxels(p);
+  const openvdb::Vec3d at = impl_->in_voxels(impl_->pose.to_frame(p));
   Vec3 gradient;
   for (int d = 0; d < 3; ++d) {
     openvdb::Vec3d step(0.0);
@@ -354,13 +380,19 @@ Vec3 InterfaceMesh::normal(const Vec3& p) const {
     gradient[d] = impl_->value_at(at + step) - impl_->value_at(at - step);
   }
   const double steepness = gradient.norm();
-  return steepness > 0 ? Vec3(gradient / steepness) : Vec3(Vec3::Zero());
+  return steepness > 0 ? impl_->pose.turned_to_world(gradient / steepness) : Vec3(Vec3::Zero());
 }
 
 void InterfaceMesh::bounds(Vec3& lo, Vec3& hi) const {
   const Impl::Box& box = impl_->bounding_box();
-  lo = box.lo;
-  hi = box.hi;
+  if (empty()) {
+    lo = hi = Vec3::Zero();
+    return;
+  }
+  const Vec3 centre = impl_->pose.to_world(0.5 * (box.lo + box.hi));
+  const Vec3 half = turned_half_box(impl_->pose.turn(), 0.5 * (box.hi - box.lo));
+  lo = centre - half;
+  hi = centre + half;
 }
 
 /// From the distances at the voxel centres. A voxel counts with its share on the inner side of a plane at that distance; the mix of
@@ -393,7 +425,7 @@ TriangleMesh InterfaceMesh::triangles(double adaptivity) const {
 
   TriangleMesh mesh;
   mesh.vertices.reserve(points.size());
-  for (const openvdb::Vec3s& p : points) mesh.vertices.emplace_back(p.x(), p.y(), p.z());
+  for (const openvdb::Vec3s& p : points) mesh.vertices.push_back(impl_->pose.to_world(Vec3(p.x(), p.y(), p.z())));
   mesh.triangles.reserve(threes.size() + 2 * fours.size());
   // OpenVDB winds its polygons the other way round.
   for (const openvdb::Vec3I& t : threes) mesh.triangles.push_back({t[0], t[2], t[1]});
@@ -405,9 +437,14 @@ TriangleMesh InterfaceMesh::triangles(double adaptivity) const {
 }
 
 std::string InterfaceMesh::to_bytes() const {
-  impl_->grid();
+  const auto grid = impl_->grid().copy();  // shares the tree
+  const Pose& p = impl_->pose;
+  const Eigen::Quaterniond& q = p.quaternion();
+  grid->insertMeta("pose_origin", openvdb::Vec3DMetadata({p.origin()[0], p.origin()[1], p.origin()[2]}));
+  grid->insertMeta("pose_turn", openvdb::Vec3DMetadata({q.x(), q.y(), q.z()}));
+  grid->insertMeta("pose_turn_w", openvdb::DoubleMetadata(q.w()));
   std::ostringstream out(std::ios::binary);
-  openvdb::io::Stream(out).write(openvdb::GridCPtrVec{impl_->stored});
+  openvdb::io::Stream(out).write(openvdb::GridCPtrVec{grid});
   return out.str();
 }
 
@@ -418,6 +455,11 @@ InterfaceMesh InterfaceMesh::from_bytes(const std::string& bytes, double voxel, 
     std::istringstream in(bytes, std::ios::binary);
     const openvdb::GridPtrVecPtr grids = openvdb::io::Stream(in, /*delayLoad=*/false).getGrids();
     if (grids && grids->size() == 1) grid = openvdb::gridPtrCast<FloatGrid>(grids->front());
+    if (grid) {
+      const openvdb::Vec3d o = grid->metaValue<openvdb::Vec3d>("pose_origin"), q = grid->metaValue<openvdb::Vec3d>("pose_turn");
+      mesh.impl_->pose = Pose(Vec3(o[0], o[1], o[2]), Eigen::Quaterniond(grid->metaValue<double>("pose_turn_w"), q[0], q[1], q[2]));
+      for (const char* name : {"pose_origin", "pose_turn", "pose_turn_w"}) grid->removeMeta(name);
+    }
   } catch (const std::exception& e) {
     throw std::runtime_error(std::string("InterfaceMesh: these bytes are no interface mesh: ") + e.what());
   }
@@ -448,6 +490,7 @@ void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>&
     meshes[n]->impl_->grid();
     const auto named = meshes[n]->impl_->stored->copy();  // shares the tree
     named->setName(names[n]);
+    named->setTransform(transform(meshes[n]->impl_->voxel, meshes[n]->impl_->pose));
     grids.push_back(named);
   }
   try {

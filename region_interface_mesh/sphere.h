@@ -9,8 +9,8 @@ using Vec3 = Eigen::Vector3d;
 
 /// A sphere in world coordinates: centre and radius in m.
 struct Sphere {
-  Vec3 centre;
-  double radius;
+  Vec3 centre = Vec3::Zero();
+  double radius = 0;
 };
 
 }  // namespace solidcull

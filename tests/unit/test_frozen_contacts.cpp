@@ -1,10 +1,12 @@
 #include "frozen_contacts.h"
 
+#include <cmath>
 #include <map>
 #include <random>
 #include <set>
 #include <stdexcept>
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 namespace solidcull {
@@ -151,6 +153,96 @@ TEST(FrozenContacts, a_new_layout_after_all_is_erased_keeps_later_histories_apar
     EXPECT_EQ(seen_by(contacts, 0)[tag], (History{x, 10 * x, 100 * x})) << "of " << tag;
     EXPECT_EQ(seen_by(contacts, tag)[0], (History{x, -10 * x, 100 * x})) << "of " << tag;
   }
+}
+
+// ----------------------------------------------------------------------------------------------------------------- turning
+
+/// A number, a vector that has a sense, a number, a vector that has none, a number.
+FrozenContacts with_vectors() {
+  FrozenContacts contacts = with_layout({true, true, true, true, false, false, false, false, true});
+  contacts.set_vectors({1, 5});
+  return contacts;
+}
+
+/// A quarter turn about z: x to y, y to -x. Exact.
+const Eigen::Matrix3d quarter = (Eigen::Matrix3d() << 0, -1, 0, 1, 0, 0, 0, 0, 1).finished();
+
+TEST(FrozenContacts, a_rotation_turns_the_vectors_of_a_history_only) {
+  const FrozenContacts contacts = with_vectors();
+  EXPECT_EQ(contacts.vectors(), (std::vector<int>{1, 5}));
+  double h[] = {1, 2, 3, 4, 5, 6, 7, 8, 9};
+  contacts.turn(h, quarter);
+  EXPECT_EQ(History(h, h + 9), (History{1, -3, 2, 4, 5, -7, 6, 8, 9}));
+  FrozenContacts scalars = with_layout({true, true, true});
+  double s[] = {1, 2, 3};
+  scalars.turn(s, quarter);
+  EXPECT_EQ(History(s, s + 3), (History{1, 2, 3}));
+}
+
+TEST(FrozenContacts, a_contact_that_turns_is_turned_as_both_ends_see_it) {
+  const double h[] = {1, 2, 3, 4, 5, 6, 7, 8, 9};
+  for (const bool low_turns : {true, false})
+    for (const bool low_gives : {true, false}) {
+      FrozenContacts contacts = with_vectors();
+      contacts.add(low_gives ? 4 : 6, low_gives ? 6 : 4, h);
+      contacts.turn(low_turns ? 4 : 6, quarter, [](std::int64_t) { return true; });
+      const History giver{1, -3, 2, 4, 5, -7, 6, 8, 9}, other{-1, 3, -2, -4, 5, -7, 6, 8, -9};
+      EXPECT_EQ(seen_by(contacts, 4)[6], low_gives ? giver : other);
+      EXPECT_EQ(seen_by(contacts, 6)[4], low_gives ? other : giver);
+    }
+}
+
+TEST(FrozenContacts, a_body_that_turns_turns_each_of_its_contacts_once) {
+  // granules 0..9 turn, 10..19 do not; a pair of the first is turned by its lower one, a pair across by the one that turns
+  const Eigen::Matrix3d by = Eigen::AngleAxisd(0.7, Vec3(2, -1, 2) / 3).toRotationMatrix();
+  std::mt19937 random(9);
+  std::normal_distribution<double> number;
+  FrozenContacts contacts = with_vectors();
+  std::map<Pair, History> due;  // as the low tag sees it
+  for (int n = 0; n < 200; ++n) {
+    const std::int64_t a = random() % 20, b = random() % 20;
+    if (a == b) continue;
+    History h;
+    if (random() % 5)
+      for (int d = 0; d < 9; ++d) h.push_back(number(random));
+    contacts.add(std::min(a, b), std::max(a, b), h.empty() ? nullptr : h.data());
+    due[{std::min(a, b), std::max(a, b)}] = h;
+  }
+  contacts.erase(3);  // leaves free places behind
+  for (auto d = due.begin(); d != due.end();) d = d->first.first == 3 || d->first.second == 3 ? due.erase(d) : std::next(d);
+  for (std::int64_t tag = 0; tag < 10; ++tag)
+    contacts.turn(tag, by, [&](std::int64_t partner) { return partner > tag; });
+  int turned = 0, kept = 0;
+  for (auto& [pair, h] : due) {
+    if (pair.first < 10 && !h.empty()) {
+      for (const int v : {1, 5}) {
+        const Vec3 w = by * Vec3(h[v], h[v + 1], h[v + 2]);
+        for (int d = 0; d < 3; ++d) h[v + d] = w[d];
+      }
+      ++turned;
+    } else {
+      ++kept;
+    }
+  }
+  EXPECT_GT(turned, 30);
+  EXPECT_GT(kept, 30);
+  std::size_t listed = 0;
+  contacts.for_each_contact([&](std::int64_t low, std::int64_t high, const double* history) {
+    ++listed;
+    const History is = history ? History(history, history + 9) : History();
+    const History& should = due.at({low, high});
+    ASSERT_EQ(is.size(), should.size());
+    for (std::size_t d = 0; d < is.size(); ++d) EXPECT_NEAR(is[d], should[d], 1e-15) << low << " " << high << " " << d;
+  });
+  EXPECT_EQ(listed, due.size());
+}
+
+TEST(FrozenContacts, turning_what_has_no_contacts_or_no_history_does_nothing) {
+  FrozenContacts contacts = with_vectors();
+  contacts.add(1, 2, nullptr);
+  contacts.turn(1, quarter, [](std::int64_t) { return true; });
+  contacts.turn(99, quarter, [](std::int64_t) { return true; });
+  EXPECT_EQ(seen_by(contacts, 2)[1], History());
 }
 
 TEST(FrozenContacts, does_as_a_map_of_pairs_does_under_random_operations) {

@@ -24,6 +24,7 @@ StoredGranule granule(std::int64_t tag, const Vec3& position, double radius) {
   g.radius = radius;
   g.mass = 1e4 * radius * radius * radius;
   g.type = static_cast<int>(tag % 3);
+  g.body = 1;
   return g;
 }
 
@@ -60,7 +61,7 @@ struct Heap {
   }
   Tags near(const Sphere& s, double gap) const {
     Tags tags;
-    store.for_each_near(s, gap, [&](const StoredGranule& g) {
+    store.for_each_near(1, s, gap, [&](const StoredGranule& g) {
       EXPECT_TRUE(tags.insert(g.tag).second) << "granule " << g.tag << " is visited twice";
     });
     return tags;
@@ -102,6 +103,7 @@ TEST(GranuleStore, a_record_comes_back_to_the_bit) {
   EXPECT_EQ(back.mass, g.mass);
   EXPECT_EQ(back.tag, g.tag);
   EXPECT_EQ(back.type, g.type);
+  EXPECT_EQ(back.body, g.body);
   EXPECT_EQ(back.layout, g.layout);
   EXPECT_EQ(back.lock_step, g.lock_step);
   EXPECT_EQ(back.normal_load, g.normal_load);
@@ -209,7 +211,7 @@ TEST(GranuleStore, box_queries_miss_nothing) {
   for (int n = 0; n < 200; ++n) {
     const Vec3 a = heap.place(0.1), b = heap.place(0.1), lo = a.cwiseMin(b), hi = a.cwiseMax(b);
     Tags visited;
-    heap.store.for_each_in_box(lo, hi, [&](const StoredGranule& g) { visited.insert(g.tag); });
+    heap.store.for_each_in_box(1, lo, hi, [&](const StoredGranule& g) { visited.insert(g.tag); });
     for (const auto& g : heap.granules) {
       const Vec3& p = g.second.position;
       if ((p.array() >= lo.array()).all() && (p.array() <= hi.array()).all()) {
@@ -256,6 +258,191 @@ TEST(GranuleStore, keeps_a_granule_of_a_dense_bed_in_little_more_than_its_record
   EXPECT_LE(store.bytes_per_granule(), 2 * (numbers * sizeof(double) + sizeof(StoredGranule)));
 }
 
+// ----------------------------------------------------------------------------------------------------- bodies and their frames
+
+/// Granules of several bodies, each at a place in its own frame, and what the store should know of them.
+struct Frames {
+  GranuleStore store{0.01};
+  std::map<std::int64_t, StoredGranule> granules;
+  std::mt19937 random;
+
+  explicit Frames(unsigned seed) : random(seed) {}
+  Vec3 place() {
+    std::uniform_real_distribution<double> at(-0.05, 0.05);
+    const double x = at(random), y = at(random), z = at(random);
+    return Vec3(x, y, z);
+  }
+  double radius() { return std::uniform_real_distribution<double>(0.001, 0.004)(random); }
+  void add(std::int64_t tag, int body) {
+    StoredGranule g = granule(tag, place(), radius());
+    g.body = body;
+    const double record[] = {static_cast<double>(tag), g.radius};
+    store.add(g, record, 2);
+    granules[tag] = g;
+  }
+  void move(std::int64_t tag, int body) {
+    const Vec3 to = place();
+    store.move(tag, body, to);
+    granules[tag].body = body;
+    granules[tag].position = to;
+  }
+  /// The swallowed body's frame stands in the other one turned and shifted.
+  void merge(int swallowed, int kept) {
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(1.3, Vec3(1, 2, 2) / 3).toRotationMatrix();
+    const Vec3 shift(0.02, -0.01, 0.03);
+    const auto placed = [&](const Vec3& p) { return Vec3(turn * p + shift); };
+    store.merge(swallowed, kept, [&](StoredGranule& g) { g.position = placed(g.position); });
+    for (auto& g : granules)
+      if (g.second.body == swallowed) {
+        g.second.body = kept;
+        g.second.position = placed(g.second.position);
+      }
+  }
+  void take(std::int64_t tag) {
+    std::vector<double> record;
+    const StoredGranule g = store.take(tag, record);
+    EXPECT_EQ(g.body, granules[tag].body);
+    EXPECT_EQ(g.position, granules[tag].position);
+    EXPECT_EQ(record, (std::vector<double>{static_cast<double>(tag), g.radius}));
+    granules.erase(tag);
+  }
+  Tags near(int body, const Sphere& s, double gap) const {
+    Tags tags;
+    store.for_each_near(body, s, gap, [&](const StoredGranule& g) {
+      EXPECT_TRUE(tags.insert(g.tag).second) << "granule " << g.tag << " is visited twice";
+    });
+    return tags;
+  }
+  Tags truly_near(int body, const Sphere& s, double gap) const {
+    Tags tags;
+    for (const auto& g : granules)
+      if (g.second.body == body && (g.second.position - s.centre).norm() - g.second.radius - s.radius < gap) tags.insert(g.first);
+    return tags;
+  }
+  Tags of(int body) const {
+    Tags tags;
+    for (const auto& g : granules)
+      if (g.second.body == body) tags.insert(g.first);
+    return tags;
+  }
+  Tags in_all_space(int body) const {
+    Tags tags;
+    store.for_each_in_box(body, Vec3::Constant(-1), Vec3::Constant(1), [&](const StoredGranule& g) { tags.insert(g.tag); });
+    return tags;
+  }
+  void expect_all_known(int bodies) {
+    ASSERT_EQ(store.size(), granules.size());
+    std::set<int> listed, due;
+    store.for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
+      EXPECT_TRUE(listed.insert(body).second);
+      for (const std::int64_t tag : of(body)) {
+        const Vec3& p = granules[tag].position;
+        ASSERT_TRUE((p.array() >= lo.array()).all() && (p.array() <= hi.array()).all()) << "granule out of its body's box";
+      }
+    });
+    for (const auto& g : granules) due.insert(g.second.body);
+    ASSERT_EQ(listed, due);
+    for (int body = 1; body <= bodies; ++body) {
+      ASSERT_EQ(in_all_space(body), of(body));
+      const Sphere s{place(), 0.01};
+      for (const double gap : {0.0, 0.005, -0.002}) ASSERT_EQ(near(body, s, gap), truly_near(body, s, gap));
+    }
+  }
+};
+
+TEST(GranuleStore, a_query_of_one_body_does_not_see_another) {
+  GranuleStore store(0.01);
+  StoredGranule g = granule(1, Vec3(0.003, 0, 0), 0.002), h = granule(2, Vec3(0.003, 0, 0), 0.002);
+  h.body = 2;  // at the same place in its own frame
+  store.add(g, nullptr, 0);
+  store.add(h, nullptr, 0);
+  const auto seen = [&](int body) {
+    Tags tags;
+    store.for_each_near(body, {Vec3::Zero(), 0.002}, 0.0, [&](const StoredGranule& s) { tags.insert(s.tag); });
+    Tags in_box;
+    store.for_each_in_box(body, Vec3::Constant(-0.01), Vec3::Constant(0.01), [&](const StoredGranule& s) { in_box.insert(s.tag); });
+    EXPECT_EQ(tags, in_box);
+    return tags;
+  };
+  EXPECT_EQ(seen(1), (Tags{1}));
+  EXPECT_EQ(seen(2), (Tags{2}));
+  EXPECT_EQ(seen(3), Tags());
+  std::vector<double> record;
+  store.take(1, record);
+  EXPECT_EQ(seen(1), Tags());
+  EXPECT_EQ(seen(2), (Tags{2}));
+}
+
+TEST(GranuleStore, a_moved_granule_is_found_where_it_is_now_and_nowhere_else) {
+  Frames frames(31);
+  for (std::int64_t tag = 1; tag <= 50; ++tag) frames.add(tag, 1);
+  frames.move(7, 2);
+  EXPECT_EQ(frames.store.find(7)->body, 2);
+  EXPECT_EQ(frames.store.find(7)->position, frames.granules[7].position);
+  frames.expect_all_known(3);
+  frames.move(7, 2);  // within its body
+  frames.move(8, 1);
+  frames.expect_all_known(3);
+  frames.take(7);
+  frames.expect_all_known(3);
+  EXPECT_THROW(frames.store.move(7, 1, Vec3::Zero()), std::logic_error);
+}
+
+TEST(GranuleStore, bodies_that_merge_are_one_and_keep_their_records) {
+  Frames frames(32);
+  for (std::int64_t tag = 1; tag <= 300; ++tag) frames.add(tag, 1 + static_cast<int>(tag % 3));
+  const double mass = frames.store.mass();
+  frames.merge(3, 1);
+  frames.expect_all_known(4);
+  EXPECT_TRUE(frames.in_all_space(3).empty());
+  EXPECT_EQ(frames.in_all_space(1).size(), 200u);
+  frames.merge(4, 1);  // no granule of it is here
+  frames.merge(1, 4);  // into one that has none here
+  frames.expect_all_known(4);
+  EXPECT_EQ(frames.in_all_space(4).size(), 200u);
+  EXPECT_EQ(frames.store.mass(), mass);
+  while (!frames.granules.empty()) frames.take(frames.granules.begin()->first);
+  frames.expect_all_known(4);
+}
+
+TEST(GranuleStore, the_box_of_a_body_begins_anew_when_it_was_empty) {
+  GranuleStore store(0.01);
+  StoredGranule g = granule(1, Vec3(0.5, 0.5, 0.5), 0.002), h = granule(2, Vec3(-0.1, 0.2, 0), 0.002);
+  store.add(g, nullptr, 0);
+  std::vector<double> record;
+  store.take(1, record);
+  store.for_each_body([](int, const Vec3&, const Vec3&) { ADD_FAILURE() << "a body without granules"; });
+  store.add(h, nullptr, 0);
+  int bodies = 0;
+  store.for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
+    ++bodies;
+    EXPECT_EQ(body, 1);
+    EXPECT_EQ(lo, h.position);
+    EXPECT_EQ(hi, h.position);
+  });
+  EXPECT_EQ(bodies, 1);
+}
+
+TEST(GranuleStore, knows_its_bodies_while_granules_come_go_move_and_merge) {
+  constexpr int bodies = 5;
+  Frames frames(33);
+  std::int64_t next = 1;
+  const auto any_body = [&] { return 1 + static_cast<int>(frames.random() % bodies); };
+  for (int round = 0; round < 60; ++round) {
+    for (int n = 0; n < 40; ++n) frames.add(next++, any_body());
+    std::vector<std::int64_t> leaving, moving;
+    for (const auto& g : frames.granules) {
+      if (frames.random() % 4 == 0) leaving.push_back(g.first);
+      else if (frames.random() % 4 == 0) moving.push_back(g.first);
+    }
+    for (const std::int64_t tag : leaving) frames.take(tag);
+    for (const std::int64_t tag : moving) frames.move(tag, any_body());
+    const int a = any_body(), b = any_body();
+    if (a != b) frames.merge(a, b);
+    frames.expect_all_known(bodies);
+  }
+}
+
 // ------------------------------------------------------------------------------------------------ the carve law as geometry
 
 struct Ball {
@@ -266,7 +453,7 @@ struct Ball {
 /// What a ball takes out of the store: the granules whose centres it holds.
 Tags held_by(const GranuleStore& store, const Ball& b) {
   Tags tags;
-  store.for_each_in_box(b.centre - Vec3::Constant(b.radius), b.centre + Vec3::Constant(b.radius), [&](const StoredGranule& g) {
+  store.for_each_in_box(1, b.centre - Vec3::Constant(b.radius), b.centre + Vec3::Constant(b.radius), [&](const StoredGranule& g) {
     if ((g.position - b.centre).norm() <= b.radius) tags.insert(g.tag);
   });
   return tags;

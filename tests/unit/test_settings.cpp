@@ -64,13 +64,13 @@ TEST(Settings, without_keywords_are_the_defaults) {
   EXPECT_EQ(s.every, 0);
   EXPECT_EQ(s.depth, 2.0);
   EXPECT_EQ(s.exterior, Exterior::live);
-  EXPECT_EQ(s.speed, 0.02);
+  EXPECT_EQ(s.speed, 0.01);
   EXPECT_EQ(s.calm, 3);
   EXPECT_EQ(s.tolerance_absolute, 3.0);
   EXPECT_EQ(s.tolerance_relative, 0.0);
   EXPECT_EQ(s.carve_radius, 2.0);
   EXPECT_EQ(s.carve_cap, 4.0);
-  EXPECT_EQ(s.motion, Motion::fixed);
+  EXPECT_EQ(s.motion, Motion::rigid);
   EXPECT_EQ(s.walls, Walls::closed);
   EXPECT_EQ(s.store, Store::exact);
   EXPECT_EQ(s.restore, Restore::exact);
@@ -89,6 +89,7 @@ TEST(Settings, every_keyword_is_parsed) {
   due.tolerance_relative = 0.1;
   due.carve_radius = 1.5;
   due.carve_cap = 6;
+  due.motion = Motion::fixed;
   due.walls = Walls::surface;
   due.voxel = 0.25;
   due.meshes = {{100, "out/mesh.*.vdb"}};
@@ -102,6 +103,12 @@ TEST(Settings, every_keyword_is_parsed) {
   for (const std::string& k : setting_keywords()) EXPECT_TRUE(named.count(k)) << "keyword " << k << " is in no test";
 }
 
+TEST(Settings, bodies_move_unless_they_are_fixed) {
+  EXPECT_EQ(parsed("motion rigid").motion, Motion::rigid);
+  EXPECT_EQ(parsed("motion fixed").motion, Motion::fixed);
+  EXPECT_EQ(parsed("motion fixed motion rigid").motion, Motion::rigid);
+}
+
 TEST(Settings, keywords_come_in_any_order_and_the_last_word_counts) {
   EXPECT_EQ(parsed("calm 4 every 10").calm, parsed("every 10 calm 4").calm);
   EXPECT_EQ(parsed("calm 4 calm 6").calm, 6);
@@ -110,6 +117,7 @@ TEST(Settings, keywords_come_in_any_order_and_the_last_word_counts) {
 TEST(Settings, the_limits_themselves_are_allowed) {
   for (const char* line : {"every 1", "every 2000000000", "depth 50", "calm 1", "tolerance 0 0.1", "tolerance 0.1 0", "carve 1 1",
                            "voxel 0.1", "depth 4 voxel 2", "depth 1 voxel 0.5", "speed 1e-9", "walls closed", "walls surface",
+                           "motion rigid", "motion fixed",
                            "mesh 1 a.vdb", "mesh 1 a.stl", "mesh 1 a.vtp", "bed 1 a.vtp"})
     EXPECT_EQ(refusal(line), "") << line;
 }
@@ -174,8 +182,8 @@ const Refusal refusals[] = {
     {"carve big 4", "keyword 'carve' has the value 'big': give two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"},
     {"carve 2", "keyword 'carve' ends too early: give two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"},
 
-    {"motion rigid", "keyword 'motion' has the value 'rigid': give 'fixed'"},
-    {"motion", "keyword 'motion' ends too early: give 'fixed'"},
+    {"motion floating", "keyword 'motion' has the value 'floating': give 'rigid' or 'fixed'"},
+    {"motion", "keyword 'motion' ends too early: give 'rigid' or 'fixed'"},
     {"walls open", "keyword 'walls' has the value 'open': give 'closed' or 'surface'"},
     {"walls", "keyword 'walls' ends too early: give 'closed' or 'surface'"},
     {"store compact", "keyword 'store' has the value 'compact': give 'exact'"},

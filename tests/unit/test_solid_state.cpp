@@ -98,10 +98,51 @@ TEST(SolidStateLaw, rest_counts_translation_and_the_speed_of_the_surface) {
 }
 
 TEST(SolidStateLaw, balance_is_measured_in_granule_weights) {
-  const double m = 0.2, limit = 1.5 * m * 10.0;
-  EXPECT_TRUE(law.balanced(Vec3(0, 0, 0.999 * limit), m));
-  EXPECT_FALSE(law.balanced(Vec3(0, 1.001 * limit, 0), m));
-  EXPECT_TRUE(law.balanced(Vec3::Zero(), m));
+  const double limit = 1.5 * 10.0;  // force out of balance in weights is acceleration in g
+  const Vec3 rest = Vec3::Zero();
+  EXPECT_TRUE(law.balanced(Vec3(0, 0, 0.999 * limit), rest));
+  EXPECT_FALSE(law.balanced(Vec3(0, 1.001 * limit, 0), rest));
+  EXPECT_TRUE(law.balanced(rest, rest));
+}
+
+TEST(SolidStateLaw, balance_is_that_in_the_frame_of_the_neighbours) {
+  const Vec3 shaken(70, -20, 30), limit(0, 0, 1.5 * 10.0);
+  EXPECT_TRUE(law.balanced(shaken, shaken));
+  EXPECT_TRUE(law.balanced(shaken + 0.999 * limit, shaken));
+  EXPECT_FALSE(law.balanced(shaken + 1.001 * limit, shaken));
+  EXPECT_FALSE(law.balanced(shaken, -shaken));
+}
+
+// ------------------------------------------------------------------------------------------------------------ went on
+
+const Vec3 none = Vec3::Zero();
+
+TEST(SolidStateLaw, a_granule_goes_on_that_keeps_its_velocity) {
+  EXPECT_TRUE(law.went_on(none, none, none, 0.1));
+  EXPECT_TRUE(law.went_on(Vec3(0, 0.0099, 0), none, none, 0.1));
+  EXPECT_FALSE(law.went_on(Vec3(0, 0.0101, 0), none, none, 0.1));
+}
+
+TEST(SolidStateLaw, a_granule_goes_on_that_follows_its_neighbours) {
+  const Vec3 falling(0, 0, -10);
+  EXPECT_TRUE(law.went_on(0.1 * falling, falling, falling, 0.1));
+  EXPECT_TRUE(law.went_on(0.1 * falling + Vec3(0.0099, 0, 0), falling, falling, 0.1));
+  EXPECT_FALSE(law.went_on(0.1 * falling + Vec3(0.0101, 0, 0), falling, falling, 0.1));
+  EXPECT_FALSE(law.went_on(-0.1 * falling, falling, falling, 0.1)) << "thrown up";
+  EXPECT_FALSE(law.went_on(0.1 * falling, falling, falling, 0.2)) << "it has fallen for half of the time only";
+  EXPECT_FALSE(law.went_on(0.1 * falling, none, none, 0.1)) << "its neighbours rested";
+}
+
+TEST(SolidStateLaw, acceleration_that_comes_and_goes_within_the_time_counts_for_nothing) {
+  // a granule in a bed that rings: the velocity of the end is that of the beginning
+  EXPECT_TRUE(law.went_on(Vec3(0.005, 0, 0), Vec3(0, 0, 9), none, 0.1));
+}
+
+TEST(SolidStateLaw, a_granule_whose_frame_is_shaken_does_not_go_on) {
+  const Vec3 limit(0, 1.5 * 10.0, 0), then(3, 4, 5);
+  EXPECT_TRUE(law.went_on(none, then, then + 0.999 * limit, 0.1));
+  EXPECT_FALSE(law.went_on(none, then, then + 1.001 * limit, 0.1));
+  EXPECT_FALSE(law.went_on(0.1 * then, then, then + 1.001 * limit, 0.1));
 }
 
 }  // namespace

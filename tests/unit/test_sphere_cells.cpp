@@ -95,6 +95,28 @@ TEST(SphereCells, any_near_answers_as_brute_force) {
     }
 }
 
+TEST(SphereCells, any_near_asks_among_those_that_count_only) {
+  Random random(4);
+  const std::vector<Sphere> spheres = random.spheres(300, Vec3(1, 1, 1), 0.005, 0.05);
+  SphereCells cells;
+  cells.build(spheres, 0.1);
+  int near = 0, near_but_not_counted = 0;
+  for (int n = 0; n < 1500; ++n) {
+    const Sphere s{random.place(Vec3(1.6, 1.6, 1.6)), random.between(0.002, 0.05)};
+    const std::size_t every = 2 + n % 5;
+    std::vector<Sphere> counted;
+    for (std::size_t k = 0; k < spheres.size(); k += every) counted.push_back(spheres[k]);
+    const bool due = truly_near(counted, s, 0.01);
+    ASSERT_EQ(cells.any_near(s, 0.01, [&](std::size_t index) { return index % every == 0; }), due);
+    near += due;
+    near_but_not_counted += !due && truly_near(spheres, s, 0.01);
+  }
+  EXPECT_GT(near, 50);
+  EXPECT_GT(near_but_not_counted, 50);
+  const auto none = [](std::size_t) { return false; };
+  EXPECT_FALSE(cells.any_near({Vec3::Zero(), 1}, 1, none));
+}
+
 TEST(SphereCells, nothing_is_near_by_a_gap_below_every_overlap) {
   SphereCells cells;
   cells.build({{Vec3::Zero(), 0.1}, {Vec3(0.1, 0, 0), 0.1}}, 0.2);

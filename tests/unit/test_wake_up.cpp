@@ -54,30 +54,95 @@ TEST(WakeUpLaw, the_carved_ball_never_shrinks_below_r0) {
   EXPECT_DOUBLE_EQ(law.radius(0), r0);
 }
 
+// A = 3: 25 % of |g| by size, 5 % by direction, for a body of some hundred granules or more
+const WakeUpLaw three_weights{3.0, 0.0, g, r0, 4.0};
+constexpr double granules = 1000;
+const Vec3 down(0, 0, -g);
+
+bool gravity_changed(const Vec3& now, const Vec3& at_locking) { return three_weights.gravity_changed(now, at_locking, granules); }
+
+Vec3 tilted(double degrees) {
+  const double a = degrees * M_PI / 180;
+  return Vec3(g * std::sin(a), 0, -g * std::cos(a));
+}
+
 TEST(GravityChanged, by_size) {
-  const Vec3 down(0, 0, -g);
   EXPECT_FALSE(gravity_changed(down, down));
-  EXPECT_FALSE(gravity_changed(1.049 * down, down));
-  EXPECT_TRUE(gravity_changed(1.051 * down, down));
-  EXPECT_FALSE(gravity_changed(0.951 * down, down));
-  EXPECT_TRUE(gravity_changed(0.949 * down, down));
+  EXPECT_FALSE(gravity_changed(1.249 * down, down));
+  EXPECT_TRUE(gravity_changed(1.251 * down, down));
+  EXPECT_FALSE(gravity_changed(0.751 * down, down));
+  EXPECT_TRUE(gravity_changed(0.749 * down, down));
   EXPECT_TRUE(gravity_changed(Vec3::Zero(), down));
 }
 
 TEST(GravityChanged, by_direction) {
-  const Vec3 down(0, 0, -g);
-  const auto tilted = [](double degrees) {
-    const double a = degrees * M_PI / 180;
-    return Vec3(g * std::sin(a), 0, -g * std::cos(a));
-  };
-  EXPECT_FALSE(gravity_changed(tilted(2.8), down));  // 2 sin(a/2) = 0.05 at 2.87 degrees
+  EXPECT_FALSE(gravity_changed(tilted(2.8), down));  // sin(a) = 0.05 at 2.87 degrees
   EXPECT_TRUE(gravity_changed(tilted(2.9), down));
   EXPECT_TRUE(gravity_changed(tilted(180), down));
+  for (const Vec3& across : {Vec3(1, 0, 0), Vec3(0, -1, 0), Vec3(-0.6, 0.8, 0)}) {
+    EXPECT_FALSE(gravity_changed(down + 0.0499 * g * across, down));
+    EXPECT_TRUE(gravity_changed(down + 0.0501 * g * across, down));
+  }
+}
+
+TEST(GravityChanged, by_size_and_direction_each_on_its_own) {
+  EXPECT_FALSE(gravity_changed(1.249 * down + Vec3(0.0499 * g, 0, 0), down));
+  EXPECT_TRUE(gravity_changed(1.249 * down + Vec3(0.0501 * g, 0, 0), down));
+}
+
+TEST(GravityChanged, by_shares_that_go_with_the_tolerance) {
+  const WakeUpLaw twice{6.0, 0.0, g, r0, 4.0}, relative{0.0, 0.1, g, r0, 4.0};
+  EXPECT_FALSE(twice.gravity_changed(1.499 * down, down, granules));
+  EXPECT_TRUE(twice.gravity_changed(1.501 * down, down, granules));
+  EXPECT_FALSE(twice.gravity_changed(down + Vec3(0.0999 * g, 0, 0), down, granules));
+  EXPECT_TRUE(twice.gravity_changed(down + Vec3(0.1001 * g, 0, 0), down, granules));
+  EXPECT_FALSE(relative.gravity_changed(1.0999 * down, down, granules));
+  EXPECT_TRUE(relative.gravity_changed(1.1001 * down, down, granules));
+  EXPECT_FALSE(relative.gravity_changed(down + Vec3(0.0999 * g, 0, 0), down, granules));
+  EXPECT_TRUE(relative.gravity_changed(down + Vec3(0.1001 * g, 0, 0), down, granules));
+}
+
+TEST(GravityChanged, by_larger_shares_for_small_bodies_tenfold_at_most) {
+  const auto size_share = [](double n) {  // by bisection
+    double lo = 0, hi = 100;
+    for (int k = 0; k < 60; ++k) {
+      const double middle = 0.5 * (lo + hi);
+      (three_weights.gravity_changed((1 + middle) * down, down, n) ? hi : lo) = middle;
+    }
+    return lo;
+  };
+  for (const double n : {300.0, 301.0, 1e6, 1e12}) EXPECT_NEAR(size_share(n), 0.25, 1e-12) << n;
+  EXPECT_NEAR(size_share(150), 0.5, 1e-12);
+  EXPECT_NEAR(size_share(60), 1.25, 1e-12);
+  for (const double n : {30.0, 29.0, 2.0, 1.0}) EXPECT_NEAR(size_share(n), 2.5, 1e-12) << n;
+  EXPECT_FALSE(three_weights.gravity_changed(down + Vec3(0.499 * g, 0, 0), down, 10));
+  EXPECT_TRUE(three_weights.gravity_changed(down + Vec3(0.501 * g, 0, 0), down, 10));
 }
 
 TEST(GravityChanged, from_none) {
+  // in free fall: nothing has a direction that could change, so any is judged by its size
   EXPECT_FALSE(gravity_changed(Vec3::Zero(), Vec3::Zero()));
-  EXPECT_TRUE(gravity_changed(Vec3(0, 0, -1e-3), Vec3::Zero()));
+  for (const Vec3& direction : {Vec3(0, 0, -1), Vec3(0.6, 0, 0.8), Vec3(0, 1, 0)}) {
+    EXPECT_FALSE(gravity_changed(0.249 * g * direction, Vec3::Zero()));
+    EXPECT_TRUE(gravity_changed(0.251 * g * direction, Vec3::Zero()));
+  }
+  EXPECT_TRUE(gravity_changed(down, Vec3::Zero()));
+  const WakeUpLaw weightless{3.0, 0.0, 0.0, r0, 4.0};
+  EXPECT_FALSE(weightless.gravity_changed(Vec3::Zero(), Vec3::Zero(), granules));
+  EXPECT_TRUE(weightless.gravity_changed(Vec3(0, 0, -1e-3), Vec3::Zero(), granules));
+}
+
+TEST(GravityChanged, does_not_depend_on_how_the_body_stands) {
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(1.2, Vec3(1, -2, 2) / 3).toRotationMatrix();
+  int changed = 0;
+  for (int n = 0; n < 400; ++n) {
+    const double a = 0.7 * n;
+    const Vec3 now = down + 0.3 * g * std::sin(0.31 * n) * Vec3(std::cos(a) * 0.2, std::sin(a) * 0.2, std::cos(0.17 * n));
+    EXPECT_EQ(gravity_changed(turn * now, turn * down), gravity_changed(now, down));
+    changed += gravity_changed(now, down);
+  }
+  EXPECT_GT(changed, 50);
+  EXPECT_LT(changed, 350);
 }
 
 }  // namespace

@@ -1,0 +1,429 @@
+// How solid bodies move: in step with the engine's integrator, over ranks, and when the load on a body as a whole has changed.
+#include <mpi.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "engine_vectors.h"
+#include "fix_solid_cull.h"
+#include "group.h"
+#include "neighbor.h"
+#include "update.h"
+
+namespace solidcull {
+namespace {
+
+// a body feels a force as a whole once the wave has crossed it: steps for one granule
+constexpr double steps_per_granule = 10;
+
+Vec3 moved_corner(const Pose& then, const Pose& now, const Vec3& corner) { return now.to_world(corner) - then.to_world(corner); }
+
+}  // namespace
+
+/// Largest way (m) that a point of the box has gone from one pose to the other: at a corner, for the way is convex.
+double largest_way(const Pose& then, const Pose& now, const Vec3& lo, const Vec3& hi) {
+  double square = 0;
+  for (int c = 0; c < 8; ++c) {
+    const Vec3 corner(c & 1 ? hi[0] : lo[0], c & 2 ? hi[1] : lo[1], c & 4 ? hi[2] : lo[2]);
+    square = std::max(square, moved_corner(then, now, corner).squaredNorm());
+  }
+  return std::sqrt(square);
+}
+
+Vec3 FixSolidCull::nearest_image(const Vec3& x, const Vec3& to) const {
+  Vec3 image = x;
+  const int periodic[3] = {domain->xperiodic, domain->yperiodic, domain->zperiodic};
+  for (int d = 0; d < 3; ++d)
+    if (periodic[d]) image[d] -= domain->prd[d] * std::round((x[d] - to[d]) / domain->prd[d]);
+  return image;
+}
+
+// ------------------------------------------------------------------------------------------------------------ the time step
+
+void FixSolidCull::refresh_locked() {
+  if (!locked_index_stale_) return;
+  locked_index_stale_ = false;
+  active_.clear();
+  locked_index_.clear();
+  locked_slot_.clear();
+  locked_place_.clear();
+  FlatMap<int> slot;
+  for (auto& b : bodies_.bodies()) {
+    slot[b.first] = static_cast<int>(active_.size());
+    active_.push_back({b.first, &b.second});
+    const auto group = groups_.find(b.first);
+    if (group == groups_.end()) continue;
+    const auto at = std::lower_bound(spanning_.begin(), spanning_.end(), group->second.key);
+    if (at != spanning_.end() && *at == group->second.key) active_.back().spanning = static_cast<int>(at - spanning_.begin());
+  }
+  store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
+    const int* s = slot.find(body);
+    if (!s) broken("interior granules belong to body " + std::to_string(body) + ", which is not there");
+    const SolidBody& b = *active_[*s].body;
+    active_[*s].reach = (b.pose.to_world(0.5 * (lo + hi)) - b.motion.centre()).norm() + 0.5 * (hi - lo).norm();
+  });
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!shell_[i].locked || shell_[i].body < 0) continue;  // below 0: on its way to another rank
+    const int* s = slot.find(shell_[i].body);
+    if (!s) broken("interface granule " + std::to_string(atom->tag[i]) + " belongs to no body");
+    locked_index_.push_back(i);
+    locked_slot_.push_back(*s);
+    locked_place_.push_back(shell_[i].place);
+  }
+}
+
+void FixSolidCull::sum_loads() {
+  // contacts and other forces on interface granules, and gravity on the whole mass
+  const Vec3 g = gravity();
+  for (ActiveBody& a : active_) a.force = a.torque = Vec3::Zero();
+  for (std::size_t k = 0; k < locked_index_.size(); ++k) {
+    const int i = locked_index_[k];
+    ActiveBody& a = active_[locked_slot_[k]];
+    const Vec3 contact = vec(atom->f[i]) - atom->rmass[i] * g;
+    a.force += contact;
+    // about the frame's origin; moved to the centre below
+    a.torque += (a.body->pose.turn() * locked_place_[k]).cross(contact) + vec(atom->torque[i]);
+  }
+  for (ActiveBody& a : active_) a.torque += (a.body->pose.origin() - a.body->motion.centre()).cross(a.force);
+  if (!spanning_.empty()) {
+    std::vector<double> sums(6 * spanning_.size(), 0.0);
+    for (const ActiveBody& a : active_)
+      for (int d = 0; d < 3 && a.spanning >= 0; ++d) {
+        sums[6 * a.spanning + d] += a.force[d];
+        sums[6 * a.spanning + 3 + d] += a.torque[d];
+      }
+    MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, world);
+    for (ActiveBody& a : active_)
+      if (a.spanning >= 0) {
+        a.force = vec(&sums[6 * a.spanning]);
+        a.torque = vec(&sums[6 * a.spanning + 3]);
+      }
+  }
+  for (ActiveBody& a : active_) a.force += a.body->motion.mass() * g;
+}
+
+void FixSolidCull::post_integrate() {
+  if (!store_ || !rigid() || (comm->nprocs == 1 && active_.empty())) return;
+  const auto timed = watch_.time(Part::load);
+  const double dt = update->dt;
+  const int periodic[3] = {domain->xperiodic, domain->yperiodic, domain->zperiodic};
+  for (ActiveBody& a : active_) {
+    SolidBody& b = *a.body;
+    b.motion.kick(a.force, a.torque, 0.5 * dt);
+    b.pose.advance(b.motion.drift(dt));
+    a.way += way_in_a_step(a);
+    for (int d = 0; d < 3; ++d) {
+      const double c = b.motion.centre()[d];
+      if (!periodic[d] || (c >= domain->boxlo[d] && c < domain->boxhi[d])) continue;
+      Vec3 shift = Vec3::Zero();
+      shift[d] = c < domain->boxlo[d] ? domain->prd[d] : -domain->prd[d];
+      b.pose.shift(shift);
+      b.motion.shift(shift);
+    }
+    b.twist = b.motion.twist();
+  }
+  place_interface_granules();
+  // the engine looks at its atoms only: a body that has none would come near something unseen
+  if ((comm->nprocs == 1 || fast_bodies_) && any_rank(body_comes_too_far(0))) next_reneighbor = update->ntimestep;
+}
+
+double FixSolidCull::way_in_a_step(const ActiveBody& a) const {
+  return a.reach > 0 ? update->dt * (a.body->motion.velocity().norm() + a.body->motion.spin().norm() * a.reach) : 0.0;
+}
+
+bool FixSolidCull::body_comes_too_far(int steps) const {
+  return std::any_of(active_.begin(), active_.end(),
+                     [&](const ActiveBody& a) { return a.way + steps * way_in_a_step(a) > 0.5 * neighbor->skin; });
+}
+
+bool FixSolidCull::body_is_fast(int steps) const {
+  return std::any_of(active_.begin(), active_.end(),
+                     [&](const ActiveBody& a) { return steps * way_in_a_step(a) > 0.25 * neighbor->skin; });
+}
+
+/// The velocity field over places in the body's frame: v = constant + gradient * place.
+struct FixSolidCull::FieldInFrame {
+  Vec3 constant;
+  Eigen::Matrix3d gradient;
+  explicit FieldInFrame(const SolidBody& b) : constant(b.twist.at(b.pose.origin())) {
+    for (int d = 0; d < 3; ++d) gradient.col(d) = b.twist.spin.cross(b.pose.turn().col(d));
+  }
+  Vec3 at(const Vec3& place) const { return constant + gradient * place; }
+};
+
+void FixSolidCull::place_interface_granules() {
+  const bool periodic = domain->xperiodic || domain->yperiodic || domain->zperiodic;
+  const std::vector<FieldInFrame> fields = fields_of_bodies();
+  for (std::size_t k = 0; k < locked_index_.size(); ++k) {
+    const int i = locked_index_[k];
+    const SolidBody& b = *active_[locked_slot_[k]].body;
+    const Vec3 x = b.pose.to_world(locked_place_[k]);
+    set(atom->x[i], periodic ? nearest_image(x, vec(atom->x[i])) : x);
+    set(atom->v[i], fields[locked_slot_[k]].at(locked_place_[k]));
+    set(atom->omega[i], b.twist.spin);
+  }
+}
+
+std::vector<FixSolidCull::FieldInFrame> FixSolidCull::fields_of_bodies() const {
+  std::vector<FieldInFrame> fields;
+  fields.reserve(active_.size());
+  for (const ActiveBody& a : active_) fields.emplace_back(*a.body);
+  return fields;
+}
+
+void FixSolidCull::final_integrate() {
+  if (!store_ || !rigid() || active_.empty()) return;
+  const auto timed = watch_.time(Part::load);
+  for (ActiveBody& a : active_) {
+    a.body->motion.kick(a.force, a.torque, 0.5 * update->dt);
+    a.body->twist = a.body->motion.twist();
+  }
+  give_velocities();
+}
+
+void FixSolidCull::give_velocities() {
+  const std::vector<FieldInFrame> fields = fields_of_bodies();
+  for (std::size_t k = 0; k < locked_index_.size(); ++k) {
+    const int i = locked_index_[k];
+    set(atom->v[i], fields[locked_slot_[k]].at(locked_place_[k]));
+    set(atom->omega[i], active_[locked_slot_[k]].body->twist.spin);
+  }
+}
+
+// ------------------------------------------------------------------------------------------------------------ which bodies
+
+int FixSolidCull::key_of(int body) const {
+  const auto group = groups_.find(body);
+  return group == groups_.end() ? body * comm->nprocs + comm->me : group->second.key;
+}
+
+int FixSolidCull::key_of_atom(int i) const {
+  if (i < atom->nlocal) return shell_[i].locked ? key_of(shell_[i].body) : 0;
+  const int* key = ghost_body_.find(atom->tag[i]);
+  return key ? *key : 0;
+}
+
+void FixSolidCull::group_bodies() {
+  groups_.clear();
+  spanning_.clear();
+  group_spans_.clear();
+  if (comm->nprocs == 1) return;
+  // a contact across ranks joins the bodies of its two ends: each rank sends its end, all ranks join the same pairs
+  constexpr int columns = 6;
+  std::vector<double> rows;
+  contacts_.for_each_contact([&](std::int64_t low, std::int64_t high, const double*) {
+    const int a = bodies_.body_of(low), b = bodies_.body_of(high);
+    if ((a == 0) == (b == 0)) return;
+    const Vec3 x = bodies_.pose(a ? a : b).to_world(mass_of(a ? low : high).position);
+    rows.insert(rows.end(), {double(low), double(high), double(a ? a : b) * comm->nprocs + comm->me, x[0], x[1], x[2]});
+  });
+  rows = halo_.gather_all(rows);
+  struct Link {
+    int parent;
+    Vec3 shift;  // this one's image + shift = the parent's image
+  };
+  std::map<int, Link> links;
+  const auto root = [&](int key) {
+    Link l{key, Vec3::Zero()};
+    for (auto at = links.find(l.parent); at != links.end(); at = links.find(l.parent)) {
+      if (at->second.parent == l.parent) break;
+      l.shift += at->second.shift;
+      l.parent = at->second.parent;
+    }
+    return l;
+  };
+  std::map<std::pair<double, double>, std::size_t> first_end;
+  std::set<int> joined;
+  for (std::size_t r = 0; r < rows.size(); r += columns) {
+    const auto end = first_end.emplace(std::make_pair(rows[r], rows[r + 1]), r);
+    if (end.second) continue;
+    const std::size_t f = end.first->second;
+    const Link a = root(static_cast<int>(rows[f + 2])), b = root(static_cast<int>(rows[r + 2]));
+    joined.insert({static_cast<int>(rows[f + 2]), static_cast<int>(rows[r + 2])});
+    const Vec3 xa = vec(&rows[f + 3]), xb = vec(&rows[r + 3]);
+    Vec3 to_a = nearest_image(xb, xa) - xb;  // image of b + to_a = image of a, at this contact
+    for (int d = 0; d < 3; ++d) to_a[d] = domain->prd[d] > 0 ? domain->prd[d] * std::round(to_a[d] / domain->prd[d]) : 0;
+    const Vec3 shift = to_a + a.shift - b.shift;
+    if (a.parent == b.parent) {
+      for (int d = 0; d < 3; ++d)
+        if (std::abs(shift[d]) > 0.5 * domain->prd[d]) group_spans_[a.parent][d] = true;
+    } else if (a.parent < b.parent) {
+      links[b.parent] = {a.parent, shift};
+    } else {
+      links[a.parent] = {b.parent, -shift};
+    }
+  }
+  std::map<int, std::array<bool, 3>> spans;
+  for (const auto& s : group_spans_)
+    for (int d = 0; d < 3; ++d) spans[root(s.first).parent][d] |= s.second[d];
+  group_spans_ = spans;
+  for (const int key : joined) spanning_.push_back(root(key).parent);
+  std::sort(spanning_.begin(), spanning_.end());
+  spanning_.erase(std::unique(spanning_.begin(), spanning_.end()), spanning_.end());
+  for (const auto& body : bodies_.bodies()) {
+    const Link l = root(body.first * comm->nprocs + comm->me);
+    groups_[body.first] = {l.parent, l.shift};
+  }
+}
+
+void FixSolidCull::adopt_places() {
+  // granules of swallowed bodies move to the frame of the body that they are part of now
+  for (int i = 0; i < atom->nlocal; ++i) {
+    ShellEntry& e = shell_[i];
+    if (!e.locked || e.body < 0) continue;
+    const int body = bodies_.body_of(atom->tag[i]);
+    if (e.body == body) continue;
+    const Pose &from = bodies_.pose(e.body), &to = bodies_.pose(body);
+    if (from != to) {
+      e.place = to.to_frame(from.to_world(e.place));
+      e.reference = to.turned_to_frame(from.turned_to_world(e.reference));
+      e.load_change = to.turned_to_frame(from.turned_to_world(e.load_change));
+      const Eigen::Matrix3d turn = to.turn().transpose() * from.turn();
+      const std::int64_t tag = atom->tag[i];
+      contacts_.turn(tag, turn, [&](std::int64_t partner) { return partner > tag || !bodies_.body_of(partner); });
+    }
+    e.body = body;
+  }
+  FlatMap<Arrival> arriving;
+  arriving_.for_each([&](std::int64_t tag, Arrival a) {
+    const int body = bodies_.body_of(tag);
+    const Pose &from = bodies_.pose(a.at.body), &to = bodies_.pose(body);
+    if (from != to) a.at.position = to.to_frame(from.to_world(a.at.position));
+    a.at.body = body;
+    arriving[tag] = a;
+  });
+  arriving_ = std::move(arriving);
+  for (const auto& gone : bodies_.swallowed()) {
+    const int body = bodies_.root(gone.first);
+    const Pose &from = gone.second, &to = bodies_.pose(body);
+    const bool same = from == to;
+    const Eigen::Matrix3d turn = to.turn().transpose() * from.turn();
+    store_->merge(gone.first, body, [&](StoredGranule& g) {
+      if (same) return;
+      g.position = to.to_frame(from.to_world(g.position));
+      g.load_change = turn * g.load_change;
+      contacts_.turn(g.tag, turn, [&](std::int64_t partner) { return partner > g.tag || !bodies_.body_of(partner); });
+    });
+    clear_of_walls_.erase(gone.first);
+    at_home_.erase(gone.first);
+    drawn_.erase(gone.first);
+    if (!same) {
+      drawn_.erase(body);
+      clear_of_walls_.erase(body);
+      at_home_.erase(body);
+    }
+    if (observed_ == gone.first) observed_ = 0;
+  }
+  merges_.clear();
+  for (const auto& m : bodies_.take_merges()) merges_.push_back({m.first, m.second, bodies_.pose(m.second)});
+  bodies_.forget_swallowed();
+}
+
+void FixSolidCull::settle_bodies() {
+  group_bodies();
+  if (!rigid()) return;
+  for (auto& [number, body] : bodies_.bodies()) {
+    const auto group = groups_.find(number);
+    const bool spans = group != groups_.end() && std::binary_search(spanning_.begin(), spanning_.end(), group->second.key);
+    // what was a part of a larger body may have become a body of its own without a change of its granules
+    body.changed = body.changed || body.spanned != spans;
+    body.spanned = spans;
+    if (spans || !body.changed) continue;
+    const RigidPart part = body.part();
+    body.motion = RigidMotion(&part, 1, body.free_axes());
+    body.twist = body.motion.twist();
+    body.changed = false;
+  }
+  if (spanning_.empty()) return;
+  constexpr int columns = 23;
+  std::vector<double> rows;
+  for (auto& [number, body] : bodies_.bodies()) {
+    const Group& group = groups_.at(number);
+    if (!std::binary_search(spanning_.begin(), spanning_.end(), group.key)) continue;
+    const RigidPart p = body.part();
+    const Vec3 centre = p.centre + group.shift;
+    rows.insert(rows.end(), {double(group.key), p.mass, centre[0], centre[1], centre[2]});
+    rows.insert(rows.end(), p.inertia.data(), p.inertia.data() + 9);
+    for (const Vec3& v : {p.velocity, p.spin}) rows.insert(rows.end(), v.data(), v.data() + 3);
+    for (const bool s : body.spans) rows.push_back(s);
+  }
+  rows = halo_.gather_all(rows);
+  std::map<int, std::vector<RigidPart>> parts;
+  for (std::size_t r = 0; r < rows.size(); r += columns) {
+    RigidPart p;
+    const int key = static_cast<int>(rows[r]);
+    p.mass = rows[r + 1];
+    p.centre = vec(&rows[r + 2]);
+    p.inertia = Eigen::Map<const Eigen::Matrix3d>(&rows[r + 5]);
+    p.velocity = vec(&rows[r + 14]);
+    p.spin = vec(&rows[r + 17]);
+    parts[key].push_back(p);
+    for (int d = 0; d < 3; ++d) group_spans_[key][d] |= rows[r + 20 + d] != 0;
+  }
+  for (auto& [number, body] : bodies_.bodies()) {
+    const Group& group = groups_.at(number);
+    const auto all = parts.find(group.key);
+    if (all == parts.end()) continue;
+    SolidBody whole;
+    whole.spans = group_spans_[group.key];
+    body.motion = RigidMotion(all->second.data(), static_cast<int>(all->second.size()), whole.free_axes());
+    body.motion.shift(-group.shift);
+    body.twist = body.motion.twist();
+    body.changed = false;
+  }
+}
+
+double FixSolidCull::kinetic_energy(int body) const {
+  return bodies_.bodies().count(body) ? bodies_.body(body).part().kinetic_energy() : 0.0;
+}
+
+// ------------------------------------------------------------------------------------------------------- the load as a whole
+
+void FixSolidCull::wake_body(int key) { waking_bodies_.insert(key); }
+
+void FixSolidCull::watch_effective_gravity(bool new_gravity) {
+  // the mean acceleration over the time in which a wave crosses the body: what it feels as a whole
+  const Vec3 g = gravity();
+  const std::int64_t now = update->ntimestep;
+  for (const ActiveBody& a : active_) {
+    SolidBody& b = *a.body;
+    const double granules = (rigid() ? b.motion.mass() : b.mass.mass) * static_cast<double>(b.mass.count) / b.mass.mass;
+    const auto begin = [&] {
+      b.velocity_then = b.motion.velocity();
+      b.step_then = now;
+    };
+    if (!rigid()) {
+      if (!b.felt_known) b.felt = g;
+      b.felt_known = true;
+      if (wake_up_.gravity_changed(g, b.felt, granules)) wake_body(key_of(a.number));
+      continue;
+    }
+    if (new_gravity) {
+      if (b.felt_known && wake_up_.gravity_changed(b.pose.turned_to_frame(g - b.acceleration), b.felt, granules)) wake_body(key_of(a.number));
+      begin();
+      continue;
+    }
+    if (b.step_then < 0) {
+      begin();
+      continue;
+    }
+    const double window = std::max<double>(look_every_, steps_per_granule * std::cbrt(granules));
+    const double steps = static_cast<double>(now - b.step_then);
+    if (steps < window) continue;
+    b.acceleration = (b.motion.velocity() - b.velocity_then) / (steps * update->dt);
+    const Vec3 feels = b.pose.turned_to_frame(g - b.acceleration);
+    if (!b.felt_known) {
+      b.felt = feels;
+      b.felt_known = true;
+    } else if (wake_up_.gravity_changed(feels, b.felt, granules)) {
+      wake_body(key_of(a.number));
+    }
+    begin();
+  }
+}
+
+}  // namespace solidcull
