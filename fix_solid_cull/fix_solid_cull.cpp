@@ -437,31 +437,6 @@ void FixSolidCull::leave_locked_pairs_out() {
   }
 }
 
-void FixSolidCull::take_loads() {
-  const auto timed = watch_.time(Part::load);
-  refresh_locked();
-  if (rigid() && !(active_.empty() && spanning_.empty())) sum_loads();
-  if (thawed_) rebase_thawed_contacts();
-  largest_excess_ = 0;
-  double** force = atom->f;
-  for (std::size_t k = 0; k < locked_index_.size(); ++k) {
-    const int i = locked_index_[k];
-    ShellEntry& e = shell_[i];
-    const Vec3 load = active_[locked_slot_[k]].body->pose.turned_to_frame(vec(force[i]));
-    if (e.fresh) {
-      e.reference = load - e.load_change;
-      e.fresh = false;
-    }
-    e.load_change = load - e.reference;
-    const double tolerance = wake_up_.tolerance(atom->rmass[i], e.normal_load);
-    const double square = e.load_change.squaredNorm();
-    if (square > e.excess * e.excess * tolerance * tolerance) e.excess = std::sqrt(square) / tolerance;
-    largest_excess_ = std::max(largest_excess_, e.excess);
-    set(force[i], Vec3::Zero());
-    set(atom->torque[i], Vec3::Zero());
-  }
-}
-
 void FixSolidCull::rebase_thawed_contacts() {
   // a contact that came out of the body brings the load that it had inside: no change for the granule that stays (invariant I5)
   thawed_ = false;

@@ -84,7 +84,6 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void find_movable();
   Vec3 gravity() const;
   void leave_locked_pairs_out();
-  void take_loads();
   void rebase_thawed_contacts();
   void ask_for_reneighbouring_if_waking();
   void check_invariants();                   // I1 and I2; local
@@ -112,7 +111,9 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   struct FieldInFrame;
   void refresh_locked();
   std::vector<FieldInFrame> fields_of_bodies() const;
-  void sum_loads();
+  void add_to_body(std::size_t k, const Vec3& contact, const double* torque);
+  void take_loads();
+  void sum_over_bodies();
   double way_in_a_step(const ActiveBody& a) const;
   bool body_comes_too_far(int steps) const;
   bool body_is_fast(int steps) const;
@@ -160,7 +161,6 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void look();
   bool find_calm();
   bool can_be_culled(int mask) const;
-  int calm_needed(const ShellEntry& e) const { return settings_.calm << e.wakes; }
   void pause_where_bodies_wake();
   std::vector<Vec3> accelerations() const;
   void follow_with_surface();
@@ -210,8 +210,14 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   Sphere sphere(int i) const;
 
   // --- fix_solid_cull_restart.cpp: the store as numbers, to a file or to another rank ---------------------------------------
-  std::vector<double> serialise(const std::vector<std::int64_t>& stored, const std::vector<std::int64_t>& atoms) const;
-  void take_up(const std::vector<double>& blocks);
+  struct Block;  // what one rank wrote
+  std::vector<double> serialise(const std::vector<std::int64_t>& stored, const std::vector<std::int64_t>& atoms, bool all) const;
+  std::vector<Block> parse_blocks(const std::vector<double>& numbers, std::size_t from, std::size_t width);
+  bool is_mine(const Block& b) const;
+  void take_up_as_it_was(const Block& b);
+  void take_up(const std::vector<Block>& blocks);
+  void publish_restored();
+  void know_radius(int type, double radius);
   void take_up_restart_state();
 
   // --- fix_solid_cull_files.cpp: outputs -----------------------------------------------------------------------------------

@@ -76,18 +76,45 @@ void FixSolidCull::refresh_locked() {
   }
 }
 
-void FixSolidCull::sum_loads() {
-  // contacts and other forces on interface granules, and gravity on the whole mass
+/// The load on interface granule number k of locked_index_ goes to its body, about the frame's origin for now.
+inline void FixSolidCull::add_to_body(std::size_t k, const Vec3& contact, const double* torque) {
+  ActiveBody& a = active_[locked_slot_[k]];
+  a.force += contact;
+  a.torque += (a.body->pose.turn() * locked_place_[k]).cross(contact) + vec(torque);
+}
+
+void FixSolidCull::take_loads() {
+  const auto timed = watch_.time(Part::load);
+  refresh_locked();
+  if (thawed_) rebase_thawed_contacts();
+  largest_excess_ = 0;
+  const bool moves = rigid();
   const Vec3 g = gravity();
   for (ActiveBody& a : active_) a.force = a.torque = Vec3::Zero();
+  double** force = atom->f;
   for (std::size_t k = 0; k < locked_index_.size(); ++k) {
     const int i = locked_index_[k];
-    ActiveBody& a = active_[locked_slot_[k]];
-    const Vec3 contact = vec(atom->f[i]) - atom->rmass[i] * g;
-    a.force += contact;
-    // about the frame's origin; moved to the centre below
-    a.torque += (a.body->pose.turn() * locked_place_[k]).cross(contact) + vec(atom->torque[i]);
+    ShellEntry& e = shell_[i];
+    const Vec3 in_world = vec(force[i]);
+    if (moves) add_to_body(k, in_world - atom->rmass[i] * g, atom->torque[i]);
+    const Vec3 load = active_[locked_slot_[k]].body->pose.turned_to_frame(in_world);
+    if (e.fresh) {
+      e.reference = load - e.load_change;
+      e.fresh = false;
+    }
+    e.load_change = load - e.reference;
+    const double tolerance = wake_up_.tolerance(atom->rmass[i], e.normal_load);
+    const double square = e.load_change.squaredNorm();
+    if (square > e.excess * e.excess * tolerance * tolerance) e.excess = std::sqrt(square) / tolerance;
+    largest_excess_ = std::max(largest_excess_, e.excess);
+    set(force[i], Vec3::Zero());
+    set(atom->torque[i], Vec3::Zero());
   }
+  if (moves) sum_over_bodies();
+}
+
+void FixSolidCull::sum_over_bodies() {
+  // contacts and other forces on interface granules are there; gravity pulls the whole mass
   for (ActiveBody& a : active_) a.torque += (a.body->pose.origin() - a.body->motion.centre()).cross(a.force);
   if (!spanning_.empty()) {
     std::vector<double> sums(6 * spanning_.size(), 0.0);
@@ -103,6 +130,7 @@ void FixSolidCull::sum_loads() {
         a.torque = vec(&sums[6 * a.spanning + 3]);
       }
   }
+  const Vec3 g = gravity();
   for (ActiveBody& a : active_) a.force += a.body->motion.mass() * g;
 }
 

@@ -254,7 +254,7 @@ bool FixSolidCull::find_calm() {
               solid_state_.balanced(acceleration[i], Vec3::Zero());
     }
     e.calm = solid ? e.calm + 1 : 0;
-    candidates = candidates || e.calm >= calm_needed(e);
+    candidates = candidates || e.calm >= settings_.calm;
   }
   joins_.clear();
   for (const Pair& p : between_bodies)
@@ -387,7 +387,7 @@ void FixSolidCull::choose() {
   const double depth = settings_.depth * diameter_;
   for (int i = 0; i < atom->nlocal; ++i) {
     ShellEntry& e = shell_[i];
-    if (e.locked || e.calm < calm_needed(e)) continue;
+    if (e.locked || e.calm < settings_.calm) continue;
     e.nearest_void = surface_->void_within(observer_.to_frame(vec(atom->x[i])), depth, e.nearest_void);
     if (!e.nearest_void.none()) {
       e.waited = 0;

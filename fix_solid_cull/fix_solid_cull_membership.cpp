@@ -28,8 +28,6 @@ constexpr double store_gap_in_skins = 2.5;
 // after this share of the atoms came or went, the engine sorts its arrays at once
 constexpr double sort_share = 0.05;
 
-// a granule that wakes within so many looks was culled too early: it must be calm twice as long the next time, up to 2^most_wakes
-constexpr int soon_in_looks = 20, most_wakes = 1;
 // walls are looked at again when a body has moved by this many skins; what is nearer than that and a margin becomes an atom
 constexpr double wall_check_in_skins = 0.25;
 constexpr double wall_gap_in_skins = 1.5;
@@ -234,8 +232,6 @@ void FixSolidCull::lock(int i) {
 
 void FixSolidCull::unlock(int i) {
   ShellEntry& e = shell_[i];
-  const bool soon = update->ntimestep - e.lock_step < soon_in_looks * look_every_;
-  e.wakes = soon ? std::min(e.wakes + 1, most_wakes) : 0;
   e.locked = false;
   e.fresh = false;
   e.excess = 0;
@@ -259,7 +255,6 @@ int FixSolidCull::bring_back(std::int64_t tag) {
   e.load_change = g.load_change;
   e.normal_load = g.normal_load;
   e.lock_step = g.lock_step;
-  e.wakes = g.wakes;
   e.velocity = vec(atom->v[i]);
   e.spin = vec(atom->omega[i]);
   const SolidBody& body = bodies_.body(g.body);
@@ -288,7 +283,6 @@ void FixSolidCull::put_away(int i) {
   g.tag = atom->tag[i];
   g.type = atom->type[i];
   g.lock_step = e.lock_step;
-  g.wakes = e.wakes;
   g.load_change = e.load_change;
   g.normal_load = e.normal_load;
   store_->add(g, record.data(), static_cast<int>(record.size()));
@@ -387,17 +381,19 @@ void FixSolidCull::keep_shell_closed() {
   const auto timed = watch_.time(Part::shell);
   const double gap = neighbor->skin;
   std::set<std::int64_t> near;
-  const auto look_around = [&](const Sphere& s, int body) {
-    for_each_stored_near(s, gap, [&](const StoredGranule& g) { near.insert(g.tag); }, body);
-  };
   // exterior granules, and the shells of other bodies
-  for (int i = 0; i < atom->nlocal; ++i) {
-    if (!shell_[i].locked)
-      look_around(sphere(i), 0);
-    else if (store_bodies_ > 1)
-      look_around(sphere(i), key_of(shell_[i].body));
-  }
-  for (const Foreign& f : halo_foreign_) look_around(f.sphere, f.body);
+  std::vector<Foreign> visitors = halo_foreign_;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (!shell_[i].locked || store_bodies_ > 1) visitors.push_back({sphere(i), shell_[i].locked ? key_of(shell_[i].body) : 0});
+  store_->for_each_body([&](int body, const Vec3&, const Vec3&) {
+    const Pose& pose = bodies_.pose(body);
+    const int own = key_of(body);
+    for (const Foreign& v : visitors)
+      if (v.body != own)
+        for (const Vec3& shift : halo_.image_shifts())
+          store_->for_each_near(body, {pose.to_frame(v.sphere.centre + shift), v.sphere.radius}, gap,
+                                [&](const StoredGranule& g) { near.insert(g.tag); });
+  });
   fetch_near_walls(near);
   if (open_for_insertion_)
     for (int f = 0; f < modify->nfix; ++f) {

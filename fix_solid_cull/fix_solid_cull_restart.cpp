@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <type_traits>
 
 #include "atom.h"
 #include "comm.h"
@@ -16,8 +17,9 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261122;  // first number of the state: the format's version
-constexpr int header_size = 12;
+constexpr double file_mark = 20261123;  // first number of the state: the format's version
+constexpr int header_size = 13;
+constexpr int no_record = -1;
 
 class Writer {
  public:
@@ -61,188 +63,265 @@ class Reader {
 
 }  // namespace
 
-/// Granules, their contacts and what their bodies felt, all in the world's frame.
-std::vector<double> FixSolidCull::serialise(const std::vector<std::int64_t>& stored, const std::vector<std::int64_t>& atoms) const {
+/// Granules, their bodies and their contacts as they stand in this rank's bodies. `all`: everything that is locked here.
+std::vector<double> FixSolidCull::serialise(const std::vector<std::int64_t>& stored, const std::vector<std::int64_t>& atoms, bool all) const {
   Writer w;
+  w.number(comm->me);
+  for (const Pose* p : {&observer_, &observed_then_}) {
+    w.vector(p->origin());
+    w.numbers(p->quaternion().coeffs().data(), 4);
+  }
   w.number(records_.layouts());
   for (int l = 0; l < records_.layouts(); ++l) w.text(records_.layout_text(l));
-  w.number(static_cast<double>(stored.size()));
-  FlatMap<char> named;
-  std::map<int, std::int64_t> member;  // one of each body
-  const auto motion = [&](std::int64_t tag, int body, const Vec3& x) {
-    const Twist& twist = bodies_.body(body).twist;
-    w.vector(x);
-    w.vector(twist.at(x));
-    w.vector(twist.spin);
-    named[tag] = 1;
-    member.emplace(body, tag);
+
+  std::map<int, int> index;  // body -> its place in this list
+  Writer bodies;
+  const auto index_of = [&](int body) {
+    const auto known = index.emplace(body, static_cast<int>(index.size()));
+    if (known.second) {
+      SolidBody b = bodies_.body(body);
+      b.each_number([&](auto& x) { bodies.number(static_cast<double>(x)); });
+    }
+    return known.first->second;
   };
+  FlatMap<char> named;
+  Writer granules;
   for (const std::int64_t tag : stored) {
     const StoredGranule& g = *store_->find(tag);
     int length = 0;
     const double* record = store_->record(tag, length);
-    for (const double x : {g.radius, g.mass, double(g.tag), double(g.type), double(g.layout), double(g.lock_step), g.normal_load, double(g.wakes)})
-      w.number(x);
-    w.number(length);
-    w.numbers(record, static_cast<std::size_t>(length));
-    w.vector(bodies_.pose(g.body).turned_to_world(g.load_change));
-    motion(tag, g.body, in_world(g));
+    for (const double x : {double(g.tag), g.mass, g.radius, double(index_of(g.body))}) granules.number(x);
+    granules.vector(g.position);
+    granules.number(length);
+    for (const double x : {double(g.type), double(g.layout), double(g.lock_step), g.normal_load}) granules.number(x);
+    granules.vector(g.load_change);
+    granules.numbers(record, static_cast<std::size_t>(length));
+    named[tag] = 1;
   }
-  w.number(static_cast<double>(atoms.size()));
   for (const std::int64_t tag : atoms) {
     const int i = *index_of_.find(tag);
-    for (const double x : {double(tag), atom->rmass[i], atom->radius[i]}) w.number(x);
-    motion(tag, shell_[i].body, bodies_.pose(shell_[i].body).to_world(shell_[i].place));
+    for (const double x : {double(tag), atom->rmass[i], atom->radius[i], double(index_of(shell_[i].body))}) granules.number(x);
+    granules.vector(shell_[i].place);
+    granules.number(no_record);
+    named[tag] = 1;
   }
-  // contacts of these granules; with all granules named, those between interface granules too
-  const bool all = atoms.empty() && stored.size() == store_->size();
   Writer edges;
   double count = 0;
-  std::vector<double> turned(contacts_.width());
   contacts_.for_each_contact([&](std::int64_t low, std::int64_t high, const double* history) {
     if (!all && !named.contains(low) && !named.contains(high)) return;
-    edges.number(static_cast<double>(low));
-    edges.number(static_cast<double>(high));
-    edges.number(history != nullptr);
-    if (history) {
-      std::copy_n(history, contacts_.width(), turned.begin());
-      const int body = bodies_.body_of(low) ? bodies_.body_of(low) : bodies_.body_of(high);
-      contacts_.turn(turned.data(), bodies_.pose(body).turn());
-      edges.numbers(turned.data(), contacts_.width());
-    }
+    const int body = bodies_.body_of(low) ? bodies_.body_of(low) : bodies_.body_of(high);
+    for (const double x : {double(low), double(high), double(index_of(body)), double(history != nullptr)}) edges.number(x);
+    if (history) edges.numbers(history, contacts_.width());
     ++count;
   });
-  w.number(count);
-  const std::vector<double> e = edges.take();
-  w.numbers(e.data(), e.size());
-  if (all)
-    for (int i = 0; i < atom->nlocal; ++i)
-      if (shell_[i].locked) member.emplace(shell_[i].body, atom->tag[i]);
-  w.number(static_cast<double>(member.size()));
-  for (const auto& [body, tag] : member) {
-    const SolidBody& b = bodies_.body(body);
-    w.number(static_cast<double>(tag));
-    w.number(b.felt_known);
-    w.vector(b.pose.turned_to_world(b.felt));
-    w.vector(b.acceleration);
-  }
+  const auto part = [&](double n, Writer& from) {
+    w.number(n);
+    const std::vector<double> x = from.take();
+    w.numbers(x.data(), x.size());
+  };
+  part(static_cast<double>(index.size()), bodies);
+  part(static_cast<double>(stored.size() + atoms.size()), granules);
+  part(count, edges);
   return w.take();
 }
 
-void FixSolidCull::take_up(const std::vector<double>& blocks) {
-  Reader in(blocks, 0);
-  struct Taken {
-    MovingGranule granule;
+struct FixSolidCull::Block {
+  struct Granule {
+    double mass, radius;
+    int body;
+    Vec3 place;
     StoredGranule stored;
-    const double* record = nullptr;  // of a stored one
+    const double* record = nullptr;  // of an interior granule; none of an interface granule
     int length = 0;
   };
   struct Edge {
     std::int64_t low, high;
-    std::vector<double> history;
+    int body;
+    std::vector<double> history;  // as low sees it, frame of the body
   };
-  struct Felt {
-    std::int64_t member;
-    bool known;
-    Vec3 felt, acceleration;
-  };
-  std::map<std::int64_t, Taken> taken;  // by tag, so that bodies are founded in the same order whoever sent what
+  int rank;
+  Pose observer, observed_then;
+  std::vector<SolidBody> bodies;
+  std::map<std::int64_t, Granule> granules;  // by tag
   std::vector<Edge> edges;
-  std::vector<Felt> felts;
+};
+
+std::vector<FixSolidCull::Block> FixSolidCull::parse_blocks(const std::vector<double>& numbers, std::size_t from, std::size_t width) {
+  std::vector<Block> blocks;
+  Reader in(numbers, from);
   while (in.more()) {
+    Block b;
+    b.rank = static_cast<int>(in.whole());
+    for (Pose* p : {&b.observer, &b.observed_then}) {
+      const Vec3 origin = in.vector();
+      const double* q = in.numbers(4);
+      *p = Pose(origin, Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
+    }
     std::vector<int> layout;
     for (std::int64_t n = in.whole(); n > 0; --n) layout.push_back(records_.layout_from_text(in.text()));
+    b.bodies.resize(static_cast<std::size_t>(in.number()));
+    for (SolidBody& body : b.bodies)
+      body.each_number([&](auto& x) { x = static_cast<std::decay_t<decltype(x)>>(in.number()); });
     for (std::int64_t n = in.whole(); n > 0; --n) {
-      Taken t;
-      StoredGranule& g = t.stored;
-      g.radius = in.number();
-      g.mass = in.number();
-      g.tag = in.whole();
-      g.type = static_cast<int>(in.whole());
-      g.layout = layout[static_cast<std::size_t>(in.whole())];
-      g.lock_step = in.whole();
-      g.normal_load = in.number();
-      g.wakes = static_cast<int>(in.whole());
-      t.length = static_cast<int>(in.whole());
-      t.record = in.numbers(static_cast<std::size_t>(t.length));
-      g.load_change = in.vector();
-      const Vec3 x = in.vector(), v = in.vector();
-      t.granule = {g.mass, g.radius, x, v, in.vector()};
-      double& largest = largest_radius_by_type_[g.type];
-      largest = std::max(largest, g.radius);
-      if (halo_.owns(x) && !store_->find(g.tag)) taken.emplace(g.tag, t);
-    }
-    for (std::int64_t n = in.whole(); n > 0; --n) {
-      Taken t;
+      Block::Granule g;
       const std::int64_t tag = in.whole();
-      const double mass = in.number(), radius = in.number();
-      const Vec3 x = in.vector(), v = in.vector();
-      t.granule = {mass, radius, x, v, in.vector()};
-      if (halo_.owns(x)) taken.emplace(tag, t);
-    }
-    for (std::int64_t n = in.whole(); n > 0; --n) {
-      Edge e{in.whole(), 0, {}};
-      e.high = in.whole();
-      if (in.whole()) {
-        const double* h = in.numbers(contacts_.width());
-        e.history.assign(h, h + contacts_.width());
+      g.mass = in.number();
+      g.radius = in.number();
+      g.body = static_cast<int>(in.whole());
+      g.place = in.vector();
+      g.length = static_cast<int>(in.whole());
+      if (g.length != no_record) {
+        StoredGranule& s = g.stored;
+        s.tag = tag;
+        s.mass = g.mass;
+        s.radius = g.radius;
+        s.position = g.place;
+        s.type = static_cast<int>(in.whole());
+        s.layout = layout[static_cast<std::size_t>(in.whole())];
+        s.lock_step = in.whole();
+        s.normal_load = in.number();
+        s.load_change = in.vector();
+        g.record = in.numbers(static_cast<std::size_t>(g.length));
       }
-      edges.push_back(std::move(e));
+      b.granules.emplace(tag, g);
     }
     for (std::int64_t n = in.whole(); n > 0; --n) {
-      Felt f{in.whole(), in.number() != 0, {}, {}};
-      f.felt = in.vector();
-      f.acceleration = in.vector();
-      felts.push_back(f);
+      Block::Edge e{in.whole(), 0, 0, {}};
+      e.high = in.whole();
+      e.body = static_cast<int>(in.whole());
+      if (in.whole()) {
+        const double* h = in.numbers(width);
+        e.history.assign(h, h + width);
+      }
+      b.edges.push_back(std::move(e));
+    }
+    blocks.push_back(std::move(b));
+  }
+  return blocks;
+}
+
+void FixSolidCull::know_radius(int type, double radius) {
+  double& largest = largest_radius_by_type_[type];
+  largest = std::max(largest, radius);
+}
+
+/// Everything as it was, to the last bit; false if this rank does not hold what it held.
+bool FixSolidCull::is_mine(const Block& b) const {
+  std::size_t locked = 0;
+  for (int i = 0; i < atom->nlocal; ++i) locked += shell_[i].locked;
+  for (const auto& [tag, g] : b.granules) {
+    if (g.record ? !halo_.owns(b.bodies[g.body].pose.to_world(g.place)) : !index_of_.contains(tag)) return false;
+    locked -= g.record == nullptr;
+  }
+  return locked == 0;
+}
+
+void FixSolidCull::take_up_as_it_was(const Block& b) {
+  observer_ = b.observer;
+  observed_then_ = b.observed_then;
+  std::vector<int> number;
+  for (const SolidBody& body : b.bodies) number.push_back(bodies_.found(body));
+  for (const auto& [tag, g] : b.granules) {
+    bodies_.take_in(tag, number[g.body]);
+    if (g.record) {
+      StoredGranule s = g.stored;
+      s.body = number[g.body];
+      store_->add(s, g.record, g.length);
+      ledger_.stored(s);
+      know_radius(s.type, s.radius);
+    } else {
+      ShellEntry& e = shell_[*index_of_.find(tag)];
+      const Pose& pose = bodies_.pose(number[g.body]);
+      e.body = number[g.body];
+      e.place = g.place;
+      e.reference = pose.turned_to_frame(e.reference);
+      e.load_change = pose.turned_to_frame(e.load_change);
     }
   }
-  // after a restart: interface granules that have no body yet
-  for (int i = 0; i < atom->nlocal; ++i)
-    if (shell_[i].locked && shell_[i].body == 0) {
-      Taken t;
-      t.granule = moving(i);
-      taken.emplace(atom->tag[i], t);
+  for (const Block::Edge& e : b.edges) contacts_.add(e.low, e.high, e.history.empty() ? nullptr : e.history.data());
+  group_bodies();
+}
+
+/// Each rank takes the granules whose places it owns, with the motion that they have in their bodies, and ties them together anew.
+void FixSolidCull::take_up(const std::vector<Block>& blocks) {
+  struct Taken {
+    const Block* block;
+    const Block::Granule* granule;
+  };
+  std::map<std::int64_t, Taken> taken;  // by tag, so that bodies are founded in the same order whoever sent what
+  for (const Block& b : blocks)
+    for (const auto& [tag, g] : b.granules) {
+      if (g.record) know_radius(g.stored.type, g.radius);
+      const int* i = index_of_.find(tag);
+      const bool here = i && shell_[*i].locked && shell_[*i].body == 0;  // an interface granule of a restart file
+      if (!bodies_.body_of(tag) && (here || halo_.owns(b.bodies[g.body].pose.to_world(g.place)))) taken.emplace(tag, Taken{&b, &g});
     }
-  const auto here = [&](std::int64_t tag) { return taken.count(tag) || bodies_.body_of(tag); };
   fresh_contacts_.clear();
-  for (Edge& e : edges) {
-    if ((!here(e.low) && !here(e.high)) || contacts_.contains(e.low, e.high)) continue;
-    contacts_.add(e.low, e.high, nullptr);
-    if (!e.history.empty()) fresh_contacts_.push_back({e.low, e.high, std::move(e.history)});
-  }
-  for (auto& [tag, t] : taken) {
-    if (!rigid()) t.granule.velocity = t.granule.spin = Vec3::Zero();
-    const SolidBodies::Place at = bodies_.lock(tag, t.granule, contacts_, [&](std::int64_t other) { return mass_of(other); });
-    const Pose& pose = bodies_.pose(at.body);
-    if (t.record) {
-      t.stored.position = at.position;
-      t.stored.body = at.body;
-      t.stored.load_change = pose.turned_to_frame(t.stored.load_change);
-      store_->add(t.stored, t.record, t.length);
-      ledger_.stored(t.stored);
-    } else if (const int* i = index_of_.find(tag)) {
+  const auto ours = [&](std::int64_t tag) { return taken.count(tag) || bodies_.body_of(tag); };
+  for (const Block& b : blocks)
+    for (const Block::Edge& e : b.edges) {
+      if ((!ours(e.low) && !ours(e.high)) || contacts_.contains(e.low, e.high)) continue;
+      contacts_.add(e.low, e.high, nullptr);
+      if (e.history.empty()) continue;
+      fresh_contacts_.push_back({e.low, e.high, e.history});
+      contacts_.turn(fresh_contacts_.back().history.data(), b.bodies[e.body].pose.turn());
+    }
+  for (const auto& [tag, t] : taken) {
+    const SolidBody& from = t.block->bodies[t.granule->body];
+    const Vec3 x = from.pose.to_world(t.granule->place);
+    const MovingGranule granule{t.granule->mass, t.granule->radius, x, from.twist.at(x), from.twist.spin};
+    const SolidBodies::Place at = bodies_.lock(tag, granule, contacts_, [&](std::int64_t other) { return mass_of(other); });
+    SolidBody& to = bodies_.body(at.body);
+    if (!to.felt_known && from.felt_known) {
+      to.felt = to.pose.turned_to_frame(from.pose.turned_to_world(from.felt));
+      to.felt_known = true;
+      to.acceleration = from.acceleration;
+    }
+    const int* i = index_of_.find(tag);
+    if (t.granule->record) {
+      StoredGranule s = t.granule->stored;
+      s.position = at.position;
+      s.body = at.body;
+      s.load_change = to.pose.turned_to_frame(from.pose.turned_to_world(s.load_change));
+      store_->add(s, t.granule->record, t.granule->length);
+      ledger_.stored(s);
+    } else if (i && shell_[*i].body == 0) {
       shell_[*i].body = at.body;
       shell_[*i].place = at.position;
-      shell_[*i].reference = pose.turned_to_frame(shell_[*i].reference);
-      shell_[*i].load_change = pose.turned_to_frame(shell_[*i].load_change);
+      shell_[*i].reference = to.pose.turned_to_frame(shell_[*i].reference);
+      shell_[*i].load_change = to.pose.turned_to_frame(shell_[*i].load_change);
     } else {
-      arriving_[tag] = {at, t.granule.mass, t.granule.radius};
+      arriving_[tag] = {at, t.granule->mass, t.granule->radius};
     }
   }
   adopt_places();
   freeze_histories();
-  for (const Felt& f : felts) {
-    const int body = bodies_.body_of(f.member);
-    if (!body || bodies_.body(body).felt_known || !f.known) continue;
-    SolidBody& b = bodies_.body(body);
-    b.felt = b.pose.turned_to_frame(f.felt);
-    b.acceleration = f.acceleration;
-    b.felt_known = true;
-  }
   settle_bodies();
+}
+
+void FixSolidCull::take_up_restart_state() {
+  const std::vector<double> state = std::move(restart_state_);
+  restart_state_.clear();
+  if (static_cast<std::size_t>(state[11]) != contacts_.width())
+    refuse("the restart file holds contact histories of " + std::to_string(static_cast<int>(state[11])) +
+           " numbers and this deck's contact model has " + std::to_string(contacts_.width()) +
+           ": use the contact model that the file was written with");
+  index_of_.clear();
+  for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
+  const std::vector<Block> blocks = parse_blocks(state, header_size, contacts_.width());
+  const bool same_ranks = static_cast<int>(state[12]) == comm->nprocs && static_cast<int>(blocks.size()) == comm->nprocs;
+  if (same_ranks && !any_rank(!is_mine(blocks[comm->me])))
+    take_up_as_it_was(blocks[comm->me]);
+  else
+    take_up(blocks);
+  publish_restored();
+}
+
+void FixSolidCull::publish_restored() {
   std::int64_t held = static_cast<std::int64_t>(store_->size());
   MPI_Allreduce(&held, &stored_everywhere_, 1, MPI_INT64_T, MPI_SUM, world);
   count_bodies();
+  label_bodies();
 }
 
 /// Granules of bodies go to the rank that owns their place: those in the store now, interface granules with the engine's exchange.
@@ -265,7 +344,7 @@ void FixSolidCull::hand_over() {
   if (!any_rank(!atoms.empty() || !stored.empty())) return;
   std::sort(atoms.begin(), atoms.end());
   std::sort(stored.begin(), stored.end());
-  const std::vector<double> blocks = halo_.gather_all(serialise(stored, atoms));
+  const std::vector<double> blocks = halo_.gather_all(serialise(stored, atoms, false));
   for (const std::int64_t tag : atoms) {
     ShellEntry& e = shell_[*index_of_.find(tag)];
     e = e.in_world(bodies_.pose(e.body));
@@ -293,8 +372,8 @@ void FixSolidCull::hand_over() {
   });
   std::vector<double> record;
   for (const std::int64_t tag : stored) ledger_.returned(store_->take(tag, record));
-  take_up(blocks);
-  label_bodies();
+  take_up(parse_blocks(blocks, 0, contacts_.width()));
+  publish_restored();
 }
 
 void FixSolidCull::take_over_atoms() {
@@ -319,24 +398,17 @@ void FixSolidCull::take_over_atoms() {
 
 double FixSolidCull::store_slack() const { return comm->nprocs > 1 && rigid() ? diameter_ : 0.0; }
 
-void FixSolidCull::take_up_restart_state() {
-  const std::vector<double> state = std::move(restart_state_);
-  restart_state_.clear();
-  if (static_cast<std::size_t>(state[11]) != contacts_.width())
-    refuse("the restart file holds contact histories of " + std::to_string(static_cast<int>(state[11])) +
-           " numbers and this deck's contact model has " + std::to_string(contacts_.width()) +
-           ": use the contact model that the file was written with");
-  index_of_.clear();
-  for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
-  take_up(std::vector<double>(state.begin() + header_size, state.end()));
-  label_bodies();
-}
-
 void FixSolidCull::write_restart(FILE* file) {
   std::vector<std::int64_t> tags;
   if (store_) store_->for_each([&](const StoredGranule& g) { tags.push_back(g.tag); });
   std::sort(tags.begin(), tags.end());
-  const std::vector<double> mine = store_ ? serialise(tags, {}) : std::vector<double>{0, 0, 0, 0, 0};
+  std::vector<std::int64_t> atoms;
+  index_of_.clear();
+  for (int i = 0; i < atom->nlocal; ++i) {
+    index_of_[atom->tag[i]] = i;
+    if (shell_[i].locked) atoms.push_back(atom->tag[i]);
+  }
+  const std::vector<double> mine = store_ ? serialise(tags, atoms, true) : std::vector<double>();
 
   std::array<double, 4> counters = ledger_.counters();
   const double carves = counters[2];
@@ -354,7 +426,7 @@ void FixSolidCull::write_restart(FILE* file) {
   const int bytes = static_cast<int>(numbers * 8);
   const double header[header_size + 1] = {double(numbers), file_mark, diameter_, weight_scale_, gravity_then_[0],
                                           gravity_then_[1], gravity_then_[2], counters[0], counters[1], counters[2],
-                                          counters[3], 0.0, double(contacts_.width())};
+                                          counters[3], 0.0, double(contacts_.width()), double(comm->nprocs)};
   std::fwrite(&bytes, sizeof(int), 1, file);
   std::fwrite(header, sizeof(double), header_size + 1, file);
   std::fwrite(all.data(), sizeof(double), all.size(), file);
@@ -376,25 +448,9 @@ void FixSolidCull::restart(char* buffer) {
     ledger_.set_counters({0, 0, s[8], 0});
 
   // the neighbour cut-off is set before the store is taken up: it must know the largest stored radius
-  Reader in(restart_state_, header_size);
-  while (in.more()) {
-    for (std::int64_t n = in.whole(); n > 0; --n) in.text();
-    for (std::int64_t n = in.whole(); n > 0; --n) {
-      const double radius = in.number();
-      in.numbers(2);
-      double& largest = largest_radius_by_type_[static_cast<int>(in.number())];
-      largest = std::max(largest, radius);
-      in.numbers(4);
-      in.numbers(static_cast<std::size_t>(in.number()));
-      in.numbers(12);
-    }
-    for (std::int64_t n = in.whole(); n > 0; --n) in.numbers(12);
-    for (std::int64_t n = in.whole(); n > 0; --n) {
-      in.numbers(2);
-      if (in.number()) in.numbers(static_cast<std::size_t>(s[11]));
-    }
-    for (std::int64_t n = in.whole(); n > 0; --n) in.numbers(8);
-  }
+  for (const Block& b : parse_blocks(restart_state_, header_size, static_cast<std::size_t>(s[11])))
+    for (const auto& g : b.granules)
+      if (g.second.record) know_radius(g.second.stored.type, g.second.radius);
 }
 
 int FixSolidCull::pack_restart(int i, double* buffer) {

@@ -20,7 +20,6 @@ struct StoredGranule {
   std::int64_t tag = 0;
   int type = 0;
   int body = 0;
-  int wakes = 0;              ///< see ShellEntry
   int layout = 0;             ///< which columns its record has; the adapter knows them
   std::int64_t lock_step = 0; ///< time step at which it was locked
   double normal_load = 0;     ///< sum of its normal contact forces at locking (N)

@@ -47,6 +47,18 @@ class RigidMotion {
   RigidStep drift(double dt);
   void shift(const Vec3& by) { centre_ += by; }
 
+  /// Calls visit(number) with a reference to each number of the state, in one order: to write it to a file and to read it back.
+  template <class Visit>
+  void each_number(Visit visit) {
+    visit(mass_);
+    for (Vec3* v : {&centre_, &velocity_, &angular_momentum_})
+      for (int d = 0; d < 3; ++d) visit((*v)[d]);
+    for (int k = 0; k < 9; ++k) visit(inverse_inertia_.data()[k]);
+    for (int k = 0; k < 4; ++k) visit(turned_.coeffs()[k]);
+    for (bool& f : free_) visit(f);
+    visit(all_free_);
+  }
+
   double mass() const { return mass_; }
   const Vec3& centre() const { return centre_; }
   const Vec3& velocity() const { return velocity_; }

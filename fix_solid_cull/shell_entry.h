@@ -32,7 +32,6 @@ struct ShellEntry {
 
   // exterior granules
   int calm = 0;                           ///< looks in a row in solid state; of an interface granule: at rest against another body
-  int wakes = 0;                          ///< times in a row that it woke soon after it was culled: it must be calm for longer each time
   int waited = 0;                         ///< looks since it could have been culled
   bool registered = false;                ///< known to the implicit surface
   Vec3 registered_at = Vec3::Zero();
@@ -46,13 +45,13 @@ struct ShellEntry {
     e.load_change = pose.turned_to_world(load_change);
     return e;
   }
-  static constexpr int packed_size = 27;
+  static constexpr int packed_size = 26;
   void pack(double* to) const {
     const double values[packed_size] = {
         double(locked), double(fresh), reference[0], reference[1], reference[2], load_change[0], load_change[1], load_change[2],
         normal_load, excess, double(wall_moves), double(lock_step), velocity[0], velocity[1], velocity[2], spin[0], spin[1],
         spin[2], double(walls), double(wall_near), double(calm), double(waited), double(registered), registered_at[0],
-        registered_at[1], registered_at[2], double(wakes)};
+        registered_at[1], registered_at[2]};
     for (int k = 0; k < packed_size; ++k) to[k] = values[k];
   }
   static ShellEntry unpack(const double* v) {
@@ -73,7 +72,6 @@ struct ShellEntry {
     e.waited = static_cast<int>(v[21]);
     e.registered = v[22] != 0;
     e.registered_at = Vec3(v[23], v[24], v[25]);
-    e.wakes = static_cast<int>(v[26]);
     return e;
   }
 };

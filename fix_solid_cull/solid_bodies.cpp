@@ -78,6 +78,12 @@ int SolidBodies::found() {
   return number;
 }
 
+int SolidBodies::found(const SolidBody& body) {
+  const int number = found();
+  bodies_[number] = body;
+  return number;
+}
+
 /// The mean acceleration is that of the centre of mass: where the centre is another one now, the velocity that it began with is too.
 void SolidBodies::centre_moved(SolidBody& body, const Vec3& from) {
   const Vec3 to = body.pose.to_world(body.mass.centre());

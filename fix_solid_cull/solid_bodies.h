@@ -61,6 +61,38 @@ struct SolidBody {
   std::int64_t step_then = -1;
   Vec3 acceleration = Vec3::Zero();   ///< mean over the last window (m/s^2)
 
+  /// Calls visit(number) with a reference to each number of the state, in one order: to write it to a file and to read it back.
+  template <class Visit>
+  void each_number(Visit visit) {
+    const auto vector = [&](Vec3& v) {
+      for (int d = 0; d < 3; ++d) visit(v[d]);
+    };
+    Vec3 origin = pose.origin();
+    Eigen::Quaterniond turn = pose.quaternion();
+    vector(origin);
+    for (int k = 0; k < 4; ++k) visit(turn.coeffs()[k]);
+    pose = Pose(origin, turn);
+    visit(mass.count);
+    vector(mass.about);
+    visit(mass.mass);
+    vector(mass.first);
+    for (int k = 0; k < 9; ++k) visit(mass.second.data()[k]);
+    visit(mass.spin);
+    vector(twist.point);
+    vector(twist.velocity);
+    vector(twist.spin);
+    motion.each_number(visit);
+    visit(changed);
+    visit(spanned);
+    for (bool& s : spans) visit(s);
+    visit(summed);
+    vector(felt);
+    visit(felt_known);
+    vector(velocity_then);
+    visit(step_then);
+    vector(acceleration);
+  }
+
   RigidPart part() const;        ///< this rank's part, world frame
   FreeAxes free_axes() const;
 };
@@ -82,6 +114,10 @@ class SolidBodies {
     Vec3 position = Vec3::Zero();  ///< frame of the body (m)
   };
   Place lock(std::int64_t tag, const MovingGranule& granule, const FrozenContacts& contacts, const MassOf& mass_of);
+
+  /// A body as it was (from a restart file), and a granule that was in it. Returns its number.
+  int found(const SolidBody& body);
+  void take_in(std::int64_t tag, int body) { member_[tag] = body; }
 
   /// Two locked granules are tied together by a contact that is frozen now: their bodies merge if they were two.
   void join(std::int64_t a, std::int64_t b, const MassOf& mass_of);

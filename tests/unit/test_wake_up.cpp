@@ -54,7 +54,7 @@ TEST(WakeUpLaw, the_carved_ball_never_shrinks_below_r0) {
   EXPECT_DOUBLE_EQ(law.radius(0), r0);
 }
 
-// A = 3: 25 % of |g| by size, 5 % by direction, for a body of some hundred granules or more
+// A = 3: 25 % of |g| by size, 2.5 % by direction, for a body of some hundred granules or more
 const WakeUpLaw three_weights{3.0, 0.0, g, r0, 4.0};
 constexpr double granules = 1000;
 const Vec3 down(0, 0, -g);
@@ -76,26 +76,26 @@ TEST(GravityChanged, by_size) {
 }
 
 TEST(GravityChanged, by_direction) {
-  EXPECT_FALSE(gravity_changed(tilted(2.8), down));  // sin(a) = 0.05 at 2.87 degrees
-  EXPECT_TRUE(gravity_changed(tilted(2.9), down));
+  EXPECT_FALSE(gravity_changed(tilted(1.40), down));  // sin(a) = 0.025 at 1.43 degrees
+  EXPECT_TRUE(gravity_changed(tilted(1.46), down));
   EXPECT_TRUE(gravity_changed(tilted(180), down));
   for (const Vec3& across : {Vec3(1, 0, 0), Vec3(0, -1, 0), Vec3(-0.6, 0.8, 0)}) {
-    EXPECT_FALSE(gravity_changed(down + 0.0499 * g * across, down));
-    EXPECT_TRUE(gravity_changed(down + 0.0501 * g * across, down));
+    EXPECT_FALSE(gravity_changed(down + 0.0249 * g * across, down));
+    EXPECT_TRUE(gravity_changed(down + 0.0251 * g * across, down));
   }
 }
 
 TEST(GravityChanged, by_size_and_direction_each_on_its_own) {
-  EXPECT_FALSE(gravity_changed(1.249 * down + Vec3(0.0499 * g, 0, 0), down));
-  EXPECT_TRUE(gravity_changed(1.249 * down + Vec3(0.0501 * g, 0, 0), down));
+  EXPECT_FALSE(gravity_changed(1.249 * down + Vec3(0.0249 * g, 0, 0), down));
+  EXPECT_TRUE(gravity_changed(1.249 * down + Vec3(0.0251 * g, 0, 0), down));
 }
 
 TEST(GravityChanged, by_shares_that_go_with_the_tolerance) {
   const WakeUpLaw twice{6.0, 0.0, g, r0, 4.0}, relative{0.0, 0.1, g, r0, 4.0};
   EXPECT_FALSE(twice.gravity_changed(1.499 * down, down, granules));
   EXPECT_TRUE(twice.gravity_changed(1.501 * down, down, granules));
-  EXPECT_FALSE(twice.gravity_changed(down + Vec3(0.0999 * g, 0, 0), down, granules));
-  EXPECT_TRUE(twice.gravity_changed(down + Vec3(0.1001 * g, 0, 0), down, granules));
+  EXPECT_FALSE(twice.gravity_changed(down + Vec3(0.0499 * g, 0, 0), down, granules));
+  EXPECT_TRUE(twice.gravity_changed(down + Vec3(0.0501 * g, 0, 0), down, granules));
   EXPECT_FALSE(relative.gravity_changed(1.0999 * down, down, granules));
   EXPECT_TRUE(relative.gravity_changed(1.1001 * down, down, granules));
   EXPECT_FALSE(relative.gravity_changed(down + Vec3(0.0999 * g, 0, 0), down, granules));
@@ -115,8 +115,8 @@ TEST(GravityChanged, by_larger_shares_for_small_bodies_tenfold_at_most) {
   EXPECT_NEAR(size_share(150), 0.5, 1e-12);
   EXPECT_NEAR(size_share(60), 1.25, 1e-12);
   for (const double n : {30.0, 29.0, 2.0, 1.0}) EXPECT_NEAR(size_share(n), 2.5, 1e-12) << n;
-  EXPECT_FALSE(three_weights.gravity_changed(down + Vec3(0.499 * g, 0, 0), down, 10));
-  EXPECT_TRUE(three_weights.gravity_changed(down + Vec3(0.501 * g, 0, 0), down, 10));
+  EXPECT_FALSE(three_weights.gravity_changed(down + Vec3(0.249 * g, 0, 0), down, 10));
+  EXPECT_TRUE(three_weights.gravity_changed(down + Vec3(0.251 * g, 0, 0), down, 10));
 }
 
 TEST(GravityChanged, from_none) {
