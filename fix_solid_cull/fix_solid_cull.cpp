@@ -160,7 +160,7 @@ double FixSolidCull::surface_reach() const {
 }
 
 void FixSolidCull::pre_delete(bool unfix) {
-  if (unfix && store_) restore_all();
+  if (unfix && store_) guarded([&] { restore_all(); });
 }
 
 // ------------------------------------------------------------------------------------------------- at the start of a run
@@ -311,9 +311,9 @@ void FixSolidCull::setup_pre_exchange() {
   const int bit = group->bitmask[interface_group_];
   for (int i = 0; i < atom->nlocal; ++i)
     if (!shell_[i].locked) atom->mask[i] &= ~bit;
-  if (!restart_state_.empty()) take_up_restart_state();
+  if (!restart_state_.empty()) guarded([&] { take_up_restart_state(); });
   open_for_insertion();
-  change_membership();
+  guarded([&] { change_membership(); });
   new_run_ = false;
 }
 
@@ -344,7 +344,7 @@ void FixSolidCull::pre_exchange() {
     halo_.update();
     at_home_.clear();
   }
-  change_membership();
+  guarded([&] { change_membership(); });
 }
 
 void FixSolidCull::pre_neighbor() {
@@ -352,6 +352,7 @@ void FixSolidCull::pre_neighbor() {
   lists_are_new_ = true;
   if (!store_) return;
   take_over_atoms();
+  forget_lost_atoms();
   share_bodies();
   check_inserted();
   if (checking()) check_invariants();

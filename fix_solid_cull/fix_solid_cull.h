@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <map>
 #include <memory>
 #include <set>
@@ -79,6 +80,15 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   // --- fix_solid_cull.cpp: the hooks, refusals, scales --------------------------------------------------------------------
   void refuse(const std::string& why);       // the user's fault; collective
   void broken(const std::string& what);      // ours; local
+  /// What must not happen ends in one line, not in a stack trace.
+  template <class Work>
+  void guarded(Work work) {
+    try {
+      work();
+    } catch (const std::exception& e) {
+      broken(e.what());
+    }
+  }
   void refuse_what_cannot_be_culled();
   void find_scales();
   void find_movable();
@@ -128,6 +138,9 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void wake_body(int key);
   void hand_over();
   void take_over_atoms();
+  void fetch_from_outside();
+  void forget_lost_atoms();
+  void split_bodies();
   double kinetic_energy(int body) const;
   Vec3 nearest_image(const Vec3& x, const Vec3& to) const;
   Vec3 in_world(const StoredGranule& g) const { return bodies_.pose(g.body).to_world(g.position); }
@@ -318,6 +331,12 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
     double mass = 0, radius = 0;
   };
   FlatMap<Arrival> arriving_;  // interface granules handed over by another rank in this reneighbouring
+
+  struct Locked {
+    std::int64_t tag;
+    GranuleMass granule;
+  };
+  std::vector<Locked> locked_before_;  // interface granules of this rank when the engine was last given its atoms
 
   // bodies in motion
   std::vector<ActiveBody> active_;

@@ -137,8 +137,13 @@ void FixSolidCull::change_membership() {
     }
     store_what_is_deep();
   }
+  if (rigid() && stored_everywhere_ > 0) fetch_from_outside();
   if (change || any_rank(shell_reopened_)) publish_atom_counts();
   hand_over();
+  locked_before_.clear();
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (shell_[i].locked && shell_[i].body > 0)
+      locked_before_.push_back({atom->tag[i], {atom->rmass[i], shell_[i].place, atom->radius[i]}});
   shell_reopened_ = false;
   wake_all_ = false;
   open_for_insertion_ = false;
@@ -181,13 +186,7 @@ void FixSolidCull::free_from_bodies() {
     const auto mesh = meshes_.find(cut.first.first);
     if (mesh != meshes_.end()) mesh->second.carve({cut.second, balls_[cut.first.second].radius});
   }
-  bodies_.split(contacts_, [&](std::int64_t tag) { return mass_of(tag); },
-                [&](std::int64_t tag, int body) {
-                  if (const StoredGranule* g = store_->find(tag))
-                    store_->move(tag, body, g->position);
-                  else
-                    shell_[*index_of_.find(tag)].body = body;
-                });
+  split_bodies();
   for (const std::int64_t tag : freed_) {
     ShellEntry& e = shell_[*index_of_.find(tag)];
     e.lock_step = -1;
@@ -442,6 +441,62 @@ void FixSolidCull::fetch_near_walls(std::set<std::int64_t>& near) {
       if (walls_.primitive_near({in_world(g), g.radius}, gap)) near.insert(g.tag);
     });
   });
+}
+
+void FixSolidCull::fetch_from_outside() {
+  // a body may leave the box: what is outside becomes an atom, and the engine does with it what it does with any that leaves
+  const bool periodic[3] = {domain->xperiodic != 0, domain->yperiodic != 0, domain->zperiodic != 0};
+  const auto outside = [&](const Vec3& x, double margin) {
+    for (int d = 0; d < 3; ++d)
+      if (!periodic[d] && (x[d] - margin < domain->boxlo[d] || x[d] + margin >= domain->boxhi[d])) return true;
+    return false;
+  };
+  std::vector<std::int64_t> leaving;
+  store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
+    const Pose& pose = bodies_.pose(body);
+    if (!outside(pose.to_world(0.5 * (lo + hi)), 0.5 * (hi - lo).norm())) return;
+    // the ball around them may stick out where they do not
+    const Vec3 half = turned_half_box(pose.turn(), 0.5 * (hi - lo)), middle = pose.to_world(0.5 * (lo + hi));
+    if (!outside(middle - half, 0) && !outside(middle + half, 0)) return;
+    store_->for_each_in_box(body, lo, hi, [&](const StoredGranule& g) {
+      if (outside(in_world(g), 0)) leaving.push_back(g.tag);
+    });
+  });
+  for (const std::int64_t tag : leaving) bring_back(tag);
+  shell_reopened_ = shell_reopened_ || !leaving.empty();
+}
+
+void FixSolidCull::forget_lost_atoms() {
+  // interface granules that have left the box, or were deleted, are members of no body any more
+  std::size_t here = 0;
+  for (int i = 0; i < atom->nlocal; ++i) here += shell_[i].locked;
+  FlatMap<char> present;
+  std::vector<Locked> lost;
+  if (here != bodies_.locked() - store_->size()) {
+    for (int i = 0; i < atom->nlocal; ++i) present[atom->tag[i]] = 1;
+    for (const Locked& l : locked_before_)
+      if (!present.contains(l.tag) && bodies_.body_of(l.tag) && !store_->find(l.tag)) lost.push_back(l);
+  }
+  if (!any_rank(!lost.empty())) return;
+  index_of_.clear();
+  for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
+  for (const Locked& l : lost) bodies_.unlock(l.tag, l.granule, contacts_);
+  for (const Locked& l : lost) contacts_.erase(l.tag);
+  split_bodies();
+  settle_bodies();
+  count_bodies();
+  label_bodies();
+  locked_index_stale_ = true;
+}
+
+void FixSolidCull::split_bodies() {
+  bodies_.split(contacts_, [&](std::int64_t tag) { return mass_of(tag); },
+                [&](std::int64_t tag, int body) {
+                  if (const StoredGranule* g = store_->find(tag))
+                    store_->move(tag, body, g->position);
+                  else
+                    shell_[*index_of_.find(tag)].body = body;
+                });
 }
 
 void FixSolidCull::freeze_contacts() {

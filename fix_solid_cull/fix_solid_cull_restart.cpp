@@ -352,7 +352,6 @@ void FixSolidCull::hand_over() {
   // they leave this rank's part of their bodies; contacts with what stays are kept
   std::vector<std::int64_t> leaving = atoms;
   leaving.insert(leaving.end(), stored.begin(), stored.end());
-  const auto mass = [&](std::int64_t tag) { return mass_of(tag); };
   for (const std::int64_t tag : leaving) bodies_.unlock(tag, mass_of(tag), contacts_);
   for (const std::int64_t tag : atoms) shell_[*index_of_.find(tag)].body = -1;
   for (const std::int64_t tag : leaving) {
@@ -364,12 +363,7 @@ void FixSolidCull::hand_over() {
     contacts_.erase(tag);
     for (const FreshContact& c : kept) contacts_.add(c.tag, c.partner, c.history.empty() ? nullptr : c.history.data());
   }
-  bodies_.split(contacts_, mass, [&](std::int64_t tag, int body) {
-    if (const StoredGranule* g = store_->find(tag))
-      store_->move(tag, body, g->position);
-    else
-      shell_[*index_of_.find(tag)].body = body;
-  });
+  split_bodies();
   std::vector<double> record;
   for (const std::int64_t tag : stored) ledger_.returned(store_->take(tag, record));
   take_up(parse_blocks(blocks, 0, contacts_.width()));

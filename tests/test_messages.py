@@ -237,7 +237,7 @@ class KeywordRefusals(Case):
         "tolerance x 0": ("tolerance", "x", TOLERANCE), "tolerance 3 -1": ("tolerance", "-1", TOLERANCE),
         "tolerance 0 0": ("tolerance", "0 0", TOLERANCE), "tolerance 3": ("tolerance", None, TOLERANCE),
         "carve x 4": ("carve", "x", CARVE), "carve 2 0.5": ("carve", "0.5", CARVE), "carve 2": ("carve", None, CARVE),
-        "motion rigid": ("motion", "rigid", "'fixed'"), "motion": ("motion", None, "'fixed'"),
+        "motion free": ("motion", "free", "'rigid' or 'fixed'"), "motion": ("motion", None, "'rigid' or 'fixed'"),
         "walls open": ("walls", "open", "'closed' or 'surface'"), "walls": ("walls", None, "'closed' or 'surface'"),
         "store compact": ("store", "compact", "'exact'"), "store": ("store", None, "'exact'"),
         "restore refill": ("restore", "refill", "'exact'"), "restore": ("restore", None, "'exact'"),
