@@ -491,11 +491,14 @@ void FixSolidCull::forget_lost_atoms() {
 
 void FixSolidCull::split_bodies() {
   bodies_.split(contacts_, [&](std::int64_t tag) { return mass_of(tag); },
-                [&](std::int64_t tag, int body) {
-                  if (const StoredGranule* g = store_->find(tag))
-                    store_->move(tag, body, g->position);
-                  else
-                    shell_[*index_of_.find(tag)].body = body;
+                [&](std::int64_t tag, int body, const Vec3& place) {
+                  if (store_->find(tag)) {
+                    store_->move(tag, body, place);
+                    return;
+                  }
+                  ShellEntry& e = shell_[*index_of_.find(tag)];
+                  e.body = body;
+                  e.place = place;
                 });
 }
 

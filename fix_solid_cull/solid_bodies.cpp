@@ -227,7 +227,7 @@ void SolidBodies::sum_anew(int number, std::int64_t member, const FrozenContacts
 }
 
 void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
-                        const std::function<void(std::int64_t, int)>& moved) {
+                        const std::function<void(std::int64_t, int, const Vec3&)>& moved) {
   struct Search {
     std::vector<std::int64_t> reached;
     std::size_t next = 0;
@@ -289,25 +289,50 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       }
       // this part is closed and others are still growing: it has come off
       --growing;
-      MassProperties part;
-      for (const std::int64_t tag : mine.reached) {
-        const GranuleMass g = mass_of(tag);
-        part.add(g.mass, g.position, g.radius);
-      }
       const int fresh = found();
       SolidBody& off = bodies_[fresh];
       SolidBody& rest = bodies_[body];
       off = rest;  // same frame, same velocity field, same load at locking
-      off.mass = part;
-      off.summed = part.count;
-      off.step_then = -1;
-      rest.mass.add(part, -1);
-      rest.step_then = -1;
+      off.mass = MassProperties();
+      off.step_then = rest.step_then = -1;
       off.changed = rest.changed = true;
+      off.spans = {};
+      MassProperties gone;
       for (const std::int64_t tag : mine.reached) {
-        member_[tag] = fresh;
-        moved(tag, fresh);
+        const GranuleMass g = mass_of(tag);
+        gone.add(g.mass, g.position, g.radius);
       }
+      rest.mass.add(gone, -1);
+      // what was tied to its own image may hang free of it now: its places are brought together again
+      FlatMap<int> index;
+      std::vector<Vec3> place;
+      const bool tied = rest.spans[0] || rest.spans[1] || rest.spans[2];
+      std::vector<std::int64_t> order = {mine.reached.front()};
+      index[order.front()] = 0;
+      place.push_back(mass_of(order.front()).position);
+      for (std::size_t at = 0; at < order.size(); ++at) {
+        const Vec3 here = place[at];
+        contacts.for_each_partner(order[at], [&](std::int64_t partner) {
+          if (!member_.contains(partner)) return;
+          const int* known = index.find(partner);
+          const Vec3 there = known ? place[*known] : mass_of(partner).position;
+          const Vec3 shift = tied ? to_image_of(off.pose.turned_to_world(there - here)) : Vec3(Vec3::Zero());
+          if (known) {
+            for (int d = 0; d < 3; ++d) off.spans[d] = off.spans[d] || shift[d] != 0;
+            return;
+          }
+          index[partner] = static_cast<int>(order.size());
+          place.push_back(there + off.pose.turned_to_frame(shift));
+          order.push_back(partner);
+        });
+      }
+      for (std::size_t at = 0; at < order.size(); ++at) {
+        const GranuleMass g = mass_of(order[at]);
+        off.mass.add(g.mass, place[at], g.radius);
+        member_[order[at]] = fresh;
+        moved(order[at], fresh, place[at]);
+      }
+      off.summed = off.mass.count;
       split_parents_.push_back(body);
     }
     for (const std::int64_t tag : tags) {

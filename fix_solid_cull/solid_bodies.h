@@ -129,8 +129,9 @@ class SolidBodies {
 
   /// Bodies that came apart through the unlock() calls since the last split() become several, each with the velocity field that
   /// they had. Searches all cut edges at once and stops when one search is left, so its cost goes with the smaller parts. Calls
-  /// moved(tag, new body) for each granule of a part that came off.
-  void split(const FrozenContacts& contacts, const MassOf& mass_of, const std::function<void(std::int64_t, int)>& moved);
+  /// moved(tag, new body, place there) for each granule of a part that came off; the place is another one where the body was tied to its
+  /// own periodic image and the part is not.
+  void split(const FrozenContacts& contacts, const MassOf& mass_of, const std::function<void(std::int64_t, int, const Vec3&)>& moved);
 
   /// Bodies that lost a part in the last split().
   const std::vector<int>& split_parents() const { return split_parents_; }

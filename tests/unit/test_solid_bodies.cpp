@@ -73,9 +73,9 @@ struct Solid {
     }
     for (const std::int64_t tag : tags) contacts.erase(tag);
     std::set<int> born;
-    bodies.split(contacts, mass_of(), [&](std::int64_t tag, int body) {
+    bodies.split(contacts, mass_of(), [&](std::int64_t tag, int body, const Vec3& place) {
       EXPECT_EQ(bodies.body_of(tag), body);
-      places.at(tag).body = body;
+      places.at(tag) = {body, place};
       born.insert(body);
     });
     parents = {bodies.split_parents().begin(), bodies.split_parents().end()};
@@ -991,6 +991,23 @@ TEST(SolidBodiesInPeriodicBoxes, a_ring_through_the_box_is_tied_to_its_own_image
   open.lock(2);
   EXPECT_EQ(open.bodies.body(1).spans, (std::array<bool, 3>{}));
   EXPECT_EQ(open.now(2).position, Vec3(9.8, 0, 0));
+}
+
+TEST(SolidBodiesInPeriodicBoxes, what_comes_off_a_ring_is_a_straight_chain_that_can_turn) {
+  std::mt19937 random(7);
+  for (int n = 0; n < 20; ++n) {
+    // locked in any order, so the part may lie on both sides of the seam
+    Solid solid = periodic_chain(20, 0.3 * n, shuffled(20, random));
+    const std::vector<int> born = solid.unlock({1, 7});
+    ASSERT_EQ(born.size(), 1u);
+    const SolidBody& off = solid.bodies.body(born[0]);
+    EXPECT_EQ(off.mass.count, 5);
+    EXPECT_EQ(off.spans, (std::array<bool, 3>{}));
+    MassProperties straight;
+    for (int k = 2; k < 7; ++k) straight.add(1 + 0.1 * k, Vec3(0.5 * k, 5 + 0.1 * (k % 3), 5), 0.26);
+    EXPECT_LT((off.mass.inertia() - straight.inertia()).norm(), 1e-12);
+    for (const int k : {2, 4, 6}) EXPECT_LT((solid.now(k).position - solid.now(3).position).norm(), 2.0) << "its places lie together";
+  }
 }
 
 TEST(SolidBodiesInPeriodicBoxes, a_contact_that_closes_a_ring_later_ties_it) {
