@@ -345,7 +345,12 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::vector<int> spanning_;       // keys of bodies that span ranks, the same on all ranks
   std::map<int, std::array<bool, 3>> group_spans_;
   std::set<int> waking_bodies_;     // keys
-  std::map<int, Pose> clear_of_walls_, at_home_, drawn_;  // poses of bodies when walls, ranks, surface were last compared
+  struct SeenWalls {
+    Pose pose;                  // of the body, against still walls
+    std::vector<Vec3> corners;  // of triangles that can move, seen from the body
+  };
+  std::map<int, SeenWalls> clear_of_walls_;     // when bodies were last compared with walls
+  std::map<int, Pose> at_home_, drawn_;         // and with the ranks' subdomains and the surface
   Pose observer_;                   // the frame in which the implicit surface is drawn: that of the largest body
   int observed_ = 0;                // that body
   Pose observed_then_;              // where it was when the observer last followed

@@ -410,26 +410,36 @@ void FixSolidCull::keep_shell_closed() {
 }
 
 void FixSolidCull::fetch_near_walls(std::set<std::int64_t>& near) {
-  // walls that move, near any body; all walls, near bodies that have moved since they were last compared and at the start of a run
+  // walls and bodies are compared when they have moved against each other since the last time, and at the start of a run
   if (new_run_) clear_of_walls_.clear();
-  const double skin = neighbor->skin, gap = wall_gap_in_skins * skin;
-  std::vector<int> moved;
+  const double skin = neighbor->skin, gap = wall_gap_in_skins * skin, enough = wall_check_in_skins * skin;
+  const std::vector<WallContacts::Triangle> triangles = walls_.triangles();
+  const Vec3 reach = Vec3::Constant(store_->largest_radius() + gap);
+  std::vector<int> moved;  // bodies that are to be compared with what stands still
   store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
     const Pose& pose = bodies_.pose(body);
-    const auto then = clear_of_walls_.find(body);
-    if (then != clear_of_walls_.end() && largest_way(then->second, pose, lo, hi) < wall_check_in_skins * skin) return;
-    clear_of_walls_[body] = pose;
-    moved.push_back(body);
-  });
-  const Vec3 reach = Vec3::Constant(store_->largest_radius() + gap);
-  walls_.for_each_triangle([&](const WallContacts::Triangle& t) {
-    const auto test = [&](const StoredGranule& g) {
-      if (!near.count(g.tag) && walls_.near(t, {nearest_image(in_world(g), 0.5 * (t.box.lo + t.box.hi)), g.radius}, gap)) near.insert(g.tag);
-    };
-    if (t.moving)
-      for_each_stored_in_box(t.box.lo - reach, t.box.hi + reach, test);
-    else
-      for (const int body : moved) for_each_stored_in_box(t.box.lo - reach, t.box.hi + reach, test, body);
+    const auto known = clear_of_walls_.find(body);
+    const bool against_still = known == clear_of_walls_.end() || largest_way(known->second.pose, pose, lo, hi) >= enough;
+    // what moves is seen from the body: a wall that turns with it stays where it is
+    std::vector<Vec3> corners;
+    for (const WallContacts::Triangle& t : triangles)
+      if (t.moving)
+        for (const Vec3& c : t.corner) corners.push_back(pose.to_frame(c));
+    bool against_moving = known == clear_of_walls_.end() || known->second.corners.size() != corners.size();
+    for (std::size_t k = 0; !against_moving && k < corners.size(); ++k)
+      against_moving = (corners[k] - known->second.corners[k]).squaredNorm() >= enough * enough;
+    if (!against_still && !against_moving) return;
+    SeenWalls& seen = clear_of_walls_[body];
+    if (against_still) {
+      seen.pose = pose;
+      moved.push_back(body);
+    }
+    if (against_moving) seen.corners = std::move(corners);
+    for (const WallContacts::Triangle& t : triangles)
+      if (t.moving ? against_moving : against_still)
+        for_each_stored_in_box(t.box.lo - reach, t.box.hi + reach, [&](const StoredGranule& g) {
+          if (!near.count(g.tag) && walls_.near(t, {nearest_image(in_world(g), 0.5 * (t.box.lo + t.box.hi)), g.radius}, gap)) near.insert(g.tag);
+        }, body);
   });
   if (moved.empty()) return;
   store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {

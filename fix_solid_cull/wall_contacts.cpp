@@ -20,15 +20,16 @@ using LAMMPS_NS::TriMesh;
 
 namespace {
 
-WallContacts::Box box_of(TriMesh* mesh, int triangle) {
-  WallContacts::Box box{Vec3::Constant(HUGE_VAL), Vec3::Constant(-HUGE_VAL)};
-  for (int corner = 0; corner < 3; ++corner) {
+WallContacts::Triangle triangle(TriMesh* mesh, int index) {
+  WallContacts::Triangle t{mesh, index, {}, {Vec3::Constant(HUGE_VAL), Vec3::Constant(-HUGE_VAL)}, mesh->isMoving()};
+  for (int k = 0; k < 3; ++k) {
     double node[3];
-    mesh->node(triangle, corner, node);
-    box.lo = box.lo.cwiseMin(Vec3(node[0], node[1], node[2]));
-    box.hi = box.hi.cwiseMax(Vec3(node[0], node[1], node[2]));
+    mesh->node(index, k, node);
+    t.corner[k] = Vec3(node[0], node[1], node[2]);
+    t.box.lo = t.box.lo.cwiseMin(t.corner[k]);
+    t.box.hi = t.box.hi.cwiseMax(t.corner[k]);
   }
-  return box;
+  return t;
 }
 
 }  // namespace
@@ -90,16 +91,17 @@ bool WallContacts::near(const Triangle& t, const Sphere& s, double gap) const {
   return t.mesh->resolveTriSphereContact(-1, t.index, s.radius, x, to_wall, side) < gap;
 }
 
-void WallContacts::list(std::vector<Triangle>& all) const {
+std::vector<WallContacts::Triangle> WallContacts::triangles() const {
+  std::vector<Triangle> all;
   for (FixWallGran* wall : walls_) {
     if (!wall->is_mesh_wall()) continue;
     for (int m = 0; m < wall->n_meshes(); ++m) {
       TriMesh* mesh = wall->mesh_list()[m]->triMesh();
-      const bool moving = mesh->isMoving();
-      const int triangles = mesh->sizeLocal() + mesh->sizeGhost();
-      for (int t = 0; t < triangles; ++t) all.push_back({mesh, t, box_of(mesh, t), moving});
+      const int count = mesh->sizeLocal() + mesh->sizeGhost();
+      for (int t = 0; t < count; ++t) all.push_back(triangle(mesh, t));
     }
   }
+  return all;
 }
 
 std::vector<std::string> WallContacts::names() const {

@@ -39,16 +39,12 @@ class WallContacts : protected LAMMPS_NS::Pointers {
   struct Triangle {
     LAMMPS_NS::TriMesh* mesh;
     int index;
+    Vec3 corner[3];
     Box box;      ///< around its corners
     bool moving;  ///< the mesh can move
   };
-  /// Calls visit(triangle) for each triangle of a mesh wall on this rank.
-  template <class Visit>
-  void for_each_triangle(Visit visit) const {
-    std::vector<Triangle> all;
-    list(all);
-    for (const Triangle& t : all) visit(t);
-  }
+  /// Each triangle of a mesh wall on this rank.
+  std::vector<Triangle> triangles() const;
   /// A sphere that is no atom: is it closer than `gap` to the triangle, or to any primitive wall?
   bool near(const Triangle& t, const Sphere& s, double gap) const;
   bool primitive_near(const Sphere& s, double gap) const;
@@ -57,8 +53,6 @@ class WallContacts : protected LAMMPS_NS::Pointers {
   std::vector<std::string> names() const;
 
  private:
-  void list(std::vector<Triangle>& all) const;
-
   std::vector<LAMMPS_NS::FixWallGran*> walls_;
 };
 
