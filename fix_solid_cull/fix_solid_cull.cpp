@@ -40,7 +40,6 @@ constexpr double closing_diameters = 0.6;
 constexpr int first_granules_every = 50;
 constexpr double standard_gravity = 9.81;  // m/s^2, the scale where the deck has none
 
-
 /// Invariants are checked at every reneighbouring in debug builds, and in any build when SOLIDCULL_CHECK is in the environment.
 bool checking() {
 #ifdef NDEBUG
@@ -123,8 +122,8 @@ FixSolidCull::~FixSolidCull() {
 
 int FixSolidCull::setmask() {
   using namespace LAMMPS_NS::FixConst;
-  return PRE_INITIAL_INTEGRATE | POST_INTEGRATE | PRE_EXCHANGE | PRE_NEIGHBOR | PRE_FORCE | PRE_FINAL_INTEGRATE | FINAL_INTEGRATE |
-         END_OF_STEP;
+  return PRE_INITIAL_INTEGRATE | POST_INTEGRATE | PRE_EXCHANGE | PRE_NEIGHBOR | PRE_FORCE | PRE_FINAL_INTEGRATE |
+         FINAL_INTEGRATE | END_OF_STEP;
 }
 
 void FixSolidCull::refuse(const std::string& why) {
@@ -133,8 +132,8 @@ void FixSolidCull::refuse(const std::string& why) {
 }
 
 void FixSolidCull::broken(const std::string& what) {
-  const std::string line = "fix " + std::string(id) + " solid/cull: internal error on rank " + std::to_string(comm->me) + " at step " +
-                           std::to_string(update->ntimestep) + ": " + what + "; please report it with the deck";
+  const std::string line = "fix " + std::string(id) + " solid/cull: internal error on rank " + std::to_string(comm->me) +
+                           " at step " + std::to_string(update->ntimestep) + ": " + what + "; please report it with the deck";
   std::fprintf(stderr, "ERROR: %s\n", line.c_str());  // MPI_Abort drops what is buffered
   std::fflush(nullptr);
   error->one(__FILE__, __LINE__, line.c_str());
@@ -155,9 +154,7 @@ bool FixSolidCull::any_rank(bool here) const {
 
 double FixSolidCull::closing() const { return closing_diameters * diameter_; }
 
-double FixSolidCull::surface_reach() const {
-  return settings_.depth * diameter_ + 2 * closing() + 0.5 * contact_reach();
-}
+double FixSolidCull::surface_reach() const { return settings_.depth * diameter_ + 2 * closing() + 0.5 * contact_reach(); }
 
 void FixSolidCull::pre_delete(bool unfix) {
   if (unfix && store_) guarded([&] { restore_all(); });
@@ -174,7 +171,8 @@ void FixSolidCull::refuse_what_cannot_be_culled() {
   if (domain->box_change_size || domain->box_change_shape)
     refuse("the box changes its size (fix deform, press/berendsen, ...): a culled bed cannot follow; leave that fix out");
   const auto* pair = static_cast<LAMMPS_NS::PairGran*>(force->pair);
-  if (pair->storeContactForces()) refuse("contact forces are stored per contact (store_force_contact): those of culled granules would be missing");
+  if (pair->storeContactForces())
+    refuse("contact forces are stored per contact (store_force_contact): those of culled granules would be missing");
 
   struct Physics {
     const char* style;
@@ -230,13 +228,15 @@ void FixSolidCull::find_scales() {
   if (g > 0) weight_scale_ = g;
   if (weight_scale_ == 0) {
     weight_scale_ = standard_gravity;
-    say("fix " + std::string(id) + " solid/cull: the deck has no fix gravity; 'speed' and 'tolerance' are measured with 9.81 m/s^2");
+    say("fix " + std::string(id) +
+        " solid/cull: the deck has no fix gravity; 'speed' and 'tolerance' are measured with 9.81 m/s^2");
   }
   if (diameter_ == 0) return;  // an empty box: the first granules set the scale
   const double d = diameter_;
   look_every_ = settings_.every ? settings_.every : look_interval(d, weight_scale_, update->dt);
   solid_state_ = {settings_.speed * std::sqrt(weight_scale_ * d),
-                  SolidStateLaw::out_of_balance_share * std::max(settings_.tolerance_absolute, 1.0), weight_scale_, settings_.calm};
+                  SolidStateLaw::out_of_balance_share * std::max(settings_.tolerance_absolute, 1.0), weight_scale_,
+                  settings_.calm};
   wake_up_ = {settings_.tolerance_absolute, settings_.tolerance_relative, weight_scale_, settings_.carve_radius * d,
               settings_.carve_cap};
   if (!store_) store_ = std::make_unique<GranuleStore>(2 * d);
@@ -254,7 +254,8 @@ void FixSolidCull::find_scales() {
           from_cells(plug_cells_);
           // the box is the observer's
           const Vec3 middle = observer_.to_world(0.5 * (lo + hi));
-          const Vec3 half = turned_half_box(observer_.turn(), 0.5 * (hi - lo) + Vec3::Constant(store_->largest_radius() + closing()));
+          const Vec3 half =
+              turned_half_box(observer_.turn(), 0.5 * (hi - lo) + Vec3::Constant(store_->largest_radius() + closing()));
           for_each_stored_in_box(middle - half, middle + half, [&](const StoredGranule& g) {
             visit({observer_.to_frame(nearest_image(in_world(g), middle)), g.radius});
           });
@@ -266,7 +267,9 @@ void FixSolidCull::find_movable() {
   static const char* holding[] = {"freeze", "setforce", "move", "planeforce", "lineforce", "aveforce"};
   static const char* driving[] = {"addforce", "drag", "efield", "spring", "buoyancy"};
   movable_ = held_ = gravity_bit_ = 0;
-  const auto begins = [](const LAMMPS_NS::Fix* fix, const char* style) { return std::strncmp(fix->style, style, std::strlen(style)) == 0; };
+  const auto begins = [](const LAMMPS_NS::Fix* fix, const char* style) {
+    return std::strncmp(fix->style, style, std::strlen(style)) == 0;
+  };
   for (int f = 0; f < modify->nfix; ++f) {
     const LAMMPS_NS::Fix* fix = modify->fix[f];
     if (begins(fix, "nve")) movable_ |= fix->groupbit;
@@ -276,7 +279,8 @@ void FixSolidCull::find_movable() {
     for (const char* style : driving)
       if (begins(fix, style)) {
         held_ |= fix->groupbit;
-        say("fix " + std::string(id) + " solid/cull: fix " + fix->id + " (" + fix->style + ") adds forces that culled granules would miss: granules of its group are not culled");
+        say("fix " + std::string(id) + " solid/cull: fix " + fix->id + " (" + fix->style +
+            ") adds forces that culled granules would miss: granules of its group are not culled");
       }
   }
 }
@@ -287,13 +291,14 @@ void FixSolidCull::init() {
   walls_.connect();
   const std::vector<bool> flips = histories_.flips();
   if (contacts_.size() > 0 && flips != contacts_.layout())
-    refuse("the contact model's history has changed from " + std::to_string(contacts_.width()) + " to " + std::to_string(flips.size()) +
-           " numbers while granules are culled: unfix " + id + " before the pair_style changes");
+    refuse("the contact model's history has changed from " + std::to_string(contacts_.width()) + " to " +
+           std::to_string(flips.size()) + " numbers while granules are culled: unfix " + id + " before the pair_style changes");
   contacts_.set_layout(flips);
   contacts_.set_vectors(histories_.vectors());
   find_movable();
   halo_.update();
-  bodies_.set_periods(Vec3(domain->xperiodic ? domain->xprd : 0, domain->yperiodic ? domain->yprd : 0, domain->zperiodic ? domain->zprd : 0));
+  bodies_.set_periods(
+      Vec3(domain->xperiodic ? domain->xprd : 0, domain->yperiodic ? domain->yprd : 0, domain->zperiodic ? domain->zprd : 0));
   new_run_ = true;
 }
 
@@ -369,12 +374,17 @@ void FixSolidCull::check_invariants() {
   }
   for (int i = 0; i < atom->nlocal; ++i)
     if (shell_[i].locked && store_bodies_ > 1)
-      for_each_stored_near(sphere(i), 0.0, [&](const StoredGranule& g) {
-        broken("granule " + std::to_string(atom->tag[i]) + " of another body touches interior granule " + std::to_string(g.tag));
-      }, key_of(shell_[i].body));
+      for_each_stored_near(
+          sphere(i), 0.0,
+          [&](const StoredGranule& g) {
+            broken("granule " + std::to_string(atom->tag[i]) + " of another body touches interior granule " +
+                   std::to_string(g.tag));
+          },
+          key_of(shell_[i].body));
   // I2: the ledger
   if (ledger_.count_due() != static_cast<std::int64_t>(store_->size()))
-    broken("the ledger has " + std::to_string(ledger_.count_due()) + " granules in the store, which holds " + std::to_string(store_->size()));
+    broken("the ledger has " + std::to_string(ledger_.count_due()) + " granules in the store, which holds " +
+           std::to_string(store_->size()));
   const double mass = store_->mass();
   if (std::abs(ledger_.mass_error(*store_)) > 1e-12 * mass) broken("mass in the store differs from the ledger");
   // every locked granule is a member of a body, and nothing else is
@@ -387,7 +397,8 @@ void FixSolidCull::check_invariants() {
   for (int i = 0; i < atom->nlocal; ++i) {
     const ShellEntry& e = shell_[i];
     if (!e.locked) continue;
-    if (e.body != bodies_.body_of(atom->tag[i])) broken("interface granule " + std::to_string(atom->tag[i]) + " stands in the wrong body");
+    if (e.body != bodies_.body_of(atom->tag[i]))
+      broken("interface granule " + std::to_string(atom->tag[i]) + " stands in the wrong body");
     sums[e.body].add(atom->rmass[i], e.place, atom->radius[i]);
   }
   store_->for_each([&](const StoredGranule& g) {
@@ -396,7 +407,8 @@ void FixSolidCull::check_invariants() {
   });
   for (const auto& [number, sum] : sums) {
     const MassProperties& m = bodies_.body(number).mass;
-    if (m.count != sum.count || std::abs(m.mass - sum.mass) > 1e-12 * sum.mass || (m.centre() - sum.centre()).norm() > 1e-9 * domain->prd[0])
+    if (m.count != sum.count || std::abs(m.mass - sum.mass) > 1e-12 * sum.mass ||
+        (m.centre() - sum.centre()).norm() > 1e-9 * domain->prd[0])
       broken("body " + std::to_string(number) + " has other mass properties than its granules");
   }
 }
@@ -541,7 +553,7 @@ void FixSolidCull::count_totals() {
   MPI_Allreduce(MPI_IN_PLACE, sums, 9, MPI_DOUBLE, MPI_SUM, world);
   double largest[2] = {largest_excess_, watch_.total()};
   MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, world);
-  totals_ = {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], static_cast<double>(ledger_.carves()),
+  totals_ = {sums[0],    sums[1],    sums[2], sums[3], sums[4], sums[5], sums[6], static_cast<double>(ledger_.carves()),
              largest[0], largest[1], sums[7], sums[8]};
 }
 
@@ -562,7 +574,8 @@ void FixSolidCull::sum_carried() {
       energy += p.kinetic_energy();
       moment += g.mass * x;
     });
-  carried_ = {momentum[0], momentum[1], momentum[2], turning[0], turning[1], turning[2], energy, moment[0], moment[1], moment[2], mass};
+  carried_ = {momentum[0], momentum[1], momentum[2], turning[0], turning[1], turning[2],
+              energy,      moment[0],   moment[1],   moment[2],  mass};
   MPI_Allreduce(MPI_IN_PLACE, carried_.data(), static_cast<int>(carried_.size()), MPI_DOUBLE, MPI_SUM, world);
   for (int d = 7; d < 10; ++d) carried_[d] = carried_[10] > 0 ? carried_[d] / carried_[10] : 0.0;
 }
@@ -582,10 +595,11 @@ void FixSolidCull::post_run() {
   totals_.clear();
   compute_vector(0);
   char text[512];
-  std::snprintf(text, sizeof text,
-                "fix %s solid/cull: %.0f exterior, %.0f interface, %.0f interior granules in %.0f bodies; culled %.0f, restored %.0f, "
-                "carves %.0f; mass error %.3g kg, energy added %.3g J",
-                id, totals_[0], totals_[1], totals_[2], totals_[3], totals_[5], totals_[6], totals_[7], totals_[10], totals_[11]);
+  std::snprintf(
+      text, sizeof text,
+      "fix %s solid/cull: %.0f exterior, %.0f interface, %.0f interior granules in %.0f bodies; culled %.0f, restored %.0f, "
+      "carves %.0f; mass error %.3g kg, energy added %.3g J",
+      id, totals_[0], totals_[1], totals_[2], totals_[3], totals_[5], totals_[6], totals_[7], totals_[10], totals_[11]);
   say(text);
   double total = 0;
   std::string parts;

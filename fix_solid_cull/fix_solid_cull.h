@@ -78,8 +78,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
 
  private:
   // --- fix_solid_cull.cpp: the hooks, refusals, scales --------------------------------------------------------------------
-  void refuse(const std::string& why);       // the user's fault; collective
-  void broken(const std::string& what);      // ours; local
+  void refuse(const std::string& why);   // the user's fault; collective
+  void broken(const std::string& what);  // ours; local
   /// What must not happen ends in one line, not in a stack trace.
   template <class Work>
   void guarded(Work work) {
@@ -96,7 +96,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void leave_locked_pairs_out();
   void rebase_thawed_contacts();
   void ask_for_reneighbouring_if_waking();
-  void check_invariants();                   // I1 and I2; local
+  void check_invariants();  // I1 and I2; local
   void count_totals();
   void sum_carried();
   bool any_rank(bool here) const;
@@ -111,12 +111,13 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
     int number;
     SolidBody* body;
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // N and N m about the centre of mass, of the whole body
-    double reach = 0, way = 0;  // of its interior granules: farthest from the centre; bound of their way since the last reneighbouring (m)
-    int spanning = -1;                                 // its place among the bodies that span ranks
+    double reach = 0,
+           way = 0;  // of its interior granules: farthest from the centre; bound of their way since the last reneighbouring (m)
+    int spanning = -1;  // its place among the bodies that span ranks
   };
   struct Group {
-    int key;      // the body's number on all ranks
-    Vec3 shift;   // brings this rank's part to the image in which the whole is summed (m)
+    int key;     // the body's number on all ranks
+    Vec3 shift;  // brings this rank's part to the image in which the whole is summed (m)
   };
   struct FieldInFrame;
   void refresh_locked();
@@ -133,7 +134,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void adopt_places();
   void group_bodies();
   int key_of(int body) const;
-  int key_of_atom(int i) const;               // owned or ghost; 0: exterior
+  int key_of_atom(int i) const;  // owned or ghost; 0: exterior
   void watch_effective_gravity(bool new_gravity);
   void wake_body(int key);
   void hand_over();
@@ -144,7 +145,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   double kinetic_energy(int body) const;
   Vec3 nearest_image(const Vec3& x, const Vec3& to) const;
   Vec3 in_world(const StoredGranule& g) const { return bodies_.pose(g.body).to_world(g.position); }
-  double store_slack() const;                 // how far outside its subdomain a rank may hold a stored granule (m)
+  double store_slack() const;  // how far outside its subdomain a rank may hold a stored granule (m)
 
   /// Stored granules whose surface is closer than `gap` to the sphere's (world frame), but for those of the body `except`.
   template <class Visit>
@@ -152,7 +153,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
     store_->for_each_body([&](int body, const Vec3&, const Vec3&) {
       if (except && key_of(body) == except) return;
       const Pose& pose = bodies_.pose(body);
-      for (const Vec3& shift : halo_.image_shifts()) store_->for_each_near(body, {pose.to_frame(s.centre + shift), s.radius}, gap, visit);
+      for (const Vec3& shift : halo_.image_shifts())
+        store_->for_each_near(body, {pose.to_frame(s.centre + shift), s.radius}, gap, visit);
     });
   }
   /// Stored granules in the box (world frame), and some around it.
@@ -248,16 +250,16 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   WallContacts walls_;
 
   // scales of the deck, found at the first run
-  double diameter_ = 0;       // mean granule diameter (m)
-  double weight_scale_ = 0;   // |g| (m/s^2)
+  double diameter_ = 0;      // mean granule diameter (m)
+  double weight_scale_ = 0;  // |g| (m/s^2)
   int look_every_ = 0;
   SolidStateLaw solid_state_{};
   WakeUpLaw wake_up_{};
   Vec3 gravity_then_ = Vec3::Zero();  // at the last look
-  int movable_ = 0;            // bits of groups that an integrator moves
-  int gravity_bit_ = 0;        // bits of groups that gravity pulls
-  int held_ = 0;               // bits of groups that some fix holds or drives: never culled
-  int pause_ = 0;              // looks that culling waits after a body woke as a whole; doubles while that goes on
+  int movable_ = 0;                   // bits of groups that an integrator moves
+  int gravity_bit_ = 0;               // bits of groups that gravity pulls
+  int held_ = 0;                      // bits of groups that some fix holds or drives: never culled
+  int pause_ = 0;                     // looks that culling waits after a body woke as a whole; doubles while that goes on
   std::int64_t no_cull_until_ = -1;
 
   // the solid
@@ -272,15 +274,15 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
     int kept, swallowed;
     Pose pose;  // of the swallowed one
   };
-  std::vector<Merge> merges_;       // in the last change: what happened to their meshes
+  std::vector<Merge> merges_;  // in the last change: what happened to their meshes
   std::vector<double> largest_radius_by_type_;
 
   // the surface
   std::unique_ptr<ImplicitSurface> surface_;
-  SphereCells around_;              // owned granules and halo at the last look
-  std::vector<Sphere> plugs_;       // behind still walls (walls closed); world frame
+  SphereCells around_;         // owned granules and halo at the last look
+  std::vector<Sphere> plugs_;  // behind still walls (walls closed); world frame
   FlatMap<char> plugged_;
-  FlatMap<Sphere> moving_plugs_;    // behind walls that can move, as seen at the last look; the observer's frame
+  FlatMap<Sphere> moving_plugs_;  // behind walls that can move, as seen at the last look; the observer's frame
   std::vector<std::string> walls_then_;
   SphereCells plug_cells_;
   bool plugs_changed_ = false;
@@ -315,17 +317,17 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::vector<Foreign> halo_foreign_;  // other ranks' and periodic images' exterior and interface granules
   std::int64_t stored_everywhere_ = 0;
   std::int64_t locked_everywhere_ = 0;
-  int store_bodies_ = 0;            // bodies on all ranks: with one alone, none can come near another
-  bool shell_reopened_ = false;     // the shell grew by granules that something came near to
+  int store_bodies_ = 0;         // bodies on all ranks: with one alone, none can come near another
+  bool shell_reopened_ = false;  // the shell grew by granules that something came near to
   FlatMap<char> freed_anywhere_, locked_anywhere_;
-  FlatMap<int> ghost_body_;         // tag -> key of the body of an interface ghost
-  std::vector<int> freed_keys_;     // bodies that wake as a whole, by key, in this change
+  FlatMap<int> ghost_body_;      // tag -> key of the body of an interface ghost
+  std::vector<int> freed_keys_;  // bodies that wake as a whole, by key, in this change
   struct FreshContact {
     std::int64_t tag, partner;
-    std::vector<double> history;    // as tag sees it, world frame
+    std::vector<double> history;  // as tag sees it, world frame
   };
   std::vector<FreshContact> fresh_contacts_;
-  std::vector<double> joins_;       // rows (place of a, a, b): resting against another body for long enough
+  std::vector<double> joins_;  // rows (place of a, a, b): resting against another body for long enough
   struct Arrival {
     SolidBodies::Place at;
     double mass = 0, radius = 0;
@@ -340,20 +342,20 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
 
   // bodies in motion
   std::vector<ActiveBody> active_;
-  bool fast_bodies_ = false;        // some body may come too far between two times when ranks talk
-  std::map<int, Group> groups_;     // local body -> the body that it is a part of; empty on one rank
-  std::vector<int> spanning_;       // keys of bodies that span ranks, the same on all ranks
+  bool fast_bodies_ = false;     // some body may come too far between two times when ranks talk
+  std::map<int, Group> groups_;  // local body -> the body that it is a part of; empty on one rank
+  std::vector<int> spanning_;    // keys of bodies that span ranks, the same on all ranks
   std::map<int, std::array<bool, 3>> group_spans_;
-  std::set<int> waking_bodies_;     // keys
+  std::set<int> waking_bodies_;  // keys
   struct SeenWalls {
     Pose pose;                  // of the body, against still walls
     std::vector<Vec3> corners;  // of triangles that can move, seen from the body
   };
-  std::map<int, SeenWalls> clear_of_walls_;     // when bodies were last compared with walls
-  std::map<int, Pose> at_home_, drawn_;         // and with the ranks' subdomains and the surface
-  Pose observer_;                   // the frame in which the implicit surface is drawn: that of the largest body
-  int observed_ = 0;                // that body
-  Pose observed_then_;              // where it was when the observer last followed
+  std::map<int, SeenWalls> clear_of_walls_;  // when bodies were last compared with walls
+  std::map<int, Pose> at_home_, drawn_;      // and with the ranks' subdomains and the surface
+  Pose observer_;                            // the frame in which the implicit surface is drawn: that of the largest body
+  int observed_ = 0;                         // that body
+  Pose observed_then_;                       // where it was when the observer last followed
 
   std::vector<int> locked_index_;   // atom indices of interface granules since the last reneighbouring
   std::vector<int> locked_slot_;    // their bodies in active_
@@ -364,14 +366,14 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   bool after_setup_ = false;
   bool new_run_ = false;
   int interface_group_ = -1;
-  int look_factor_ = 1;             // looks less often where nothing can be culled
+  int look_factor_ = 1;  // looks less often where nothing can be culled
   bool told_no_worth_ = false;
   std::int64_t next_look_ = -1;
   std::int64_t membership_version_ = 0;
   double largest_excess_ = 0;
   std::vector<double> restart_state_;
   StopWatch watch_;
-  static constexpr int counts = 12;      // f_ID[1..12]; after them what interior granules carry
+  static constexpr int counts = 12;  // f_ID[1..12]; after them what interior granules carry
   std::vector<double> totals_, carried_;
   std::int64_t totals_step_ = -1, totals_version_ = -1;
 };

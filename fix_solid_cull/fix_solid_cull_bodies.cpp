@@ -431,7 +431,8 @@ void FixSolidCull::watch_effective_gravity(bool new_gravity) {
       continue;
     }
     if (new_gravity) {
-      if (b.felt_known && wake_up_.gravity_changed(b.pose.turned_to_frame(g - b.acceleration), b.felt, granules)) wake_body(key_of(a.number));
+      if (b.felt_known && wake_up_.gravity_changed(b.pose.turned_to_frame(g - b.acceleration), b.felt, granules))
+        wake_body(key_of(a.number));
       begin();
       continue;
     }

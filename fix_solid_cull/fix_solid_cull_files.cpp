@@ -161,8 +161,9 @@ void FixSolidCull::write_bed_file(const std::string& pattern) {
   };
   for (int i = 0; i < atom->nlocal; ++i) {
     const ShellEntry& e = shell_[i];
-    const GranuleState state =
-        !e.locked ? GranuleState::exterior : e.excess > 1 ? GranuleState::waking : GranuleState::interface_;
+    const GranuleState state = !e.locked      ? GranuleState::exterior
+                               : e.excess > 1 ? GranuleState::waking
+                                              : GranuleState::interface_;
     row(vec(atom->x[i]), vec(atom->v[i]), atom->radius[i], atom->tag[i], atom->type[i], state, vector_atom[i]);
   }
   store_->for_each([&](const StoredGranule& g) {

@@ -111,8 +111,8 @@ void FixSolidCull::see_walls(bool new_run) {
     const ShellEntry& e = shell_[i];
     if (settings_.walls == Walls::surface || c.gap > wall_closes * atom->radius[i]) continue;
     if (c.moving && !e.locked && e.calm == 0) continue;
-    // a plug behind the wall: behind a still one it stays, for the place behind a wall is no void whoever stands before it; one that
-    // moves has plugs where granules at rest stand at it now
+    // a plug behind the wall: behind a still one it stays, for the place behind a wall is no void whoever stands before it; one
+    // that moves has plugs where granules at rest stand at it now
     const double distance = c.to_wall.norm();
     if (distance == 0) continue;
     Vec3 at = vec(atom->x[i]) + c.to_wall, outward = c.to_wall / distance;
@@ -187,9 +187,7 @@ bool FixSolidCull::find_calm() {
   std::vector<double> mass(owned, 0.0);
   const std::vector<Vec3> acceleration = accelerations();
   const LAMMPS_NS::NeighList* list = force->pair->list;
-  const auto state = [&](int i) {
-    return MovingSphere{vec(atom->x[i]), vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]};
-  };
+  const auto state = [&](int i) { return MovingSphere{vec(atom->x[i]), vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]}; };
   struct Pair {
     int i, j;
   };
@@ -236,7 +234,8 @@ bool FixSolidCull::find_calm() {
     ShellEntry& e = shell_[i];
     if (e.locked) continue;
     if (e.walls > 0) loaded[i] = 1;
-    bool solid = (touching[i] || e.walls > 0) && !moving[i] && (loaded[i] || !drifting[i]) && (atom->mask[i] & groupbit) && can_be_culled(atom->mask[i]);
+    bool solid = (touching[i] || e.walls > 0) && !moving[i] && (loaded[i] || !drifting[i]) && (atom->mask[i] & groupbit) &&
+                 can_be_culled(atom->mask[i]);
     if (solid && rigid()) {
       // a wall is a neighbour too; that it is accelerated itself is not known here
       const double all = mass[i] + (e.walls > 0 ? atom->rmass[i] : 0.0);
@@ -269,7 +268,9 @@ bool FixSolidCull::find_calm() {
   return candidates;
 }
 
-bool FixSolidCull::can_be_culled(int mask) const { return (mask & movable_) && !(mask & held_) && (!gravity_bit_ || (mask & gravity_bit_)); }
+bool FixSolidCull::can_be_culled(int mask) const {
+  return (mask & movable_) && !(mask & held_) && (!gravity_bit_ || (mask & gravity_bit_));
+}
 
 void FixSolidCull::follow_with_surface() {
   // the surface is drawn in the frame of the largest body, so that a mass that falls or turns as one leaves it as it is
@@ -299,11 +300,13 @@ void FixSolidCull::follow_with_surface() {
   if (way <= enough) return;
   const Pose before = observer_;
   const Eigen::Quaterniond turn = now.quaternion() * observed_then_.quaternion().conjugate();
-  observer_ = Pose(now.origin() + turn * (observer_.origin() - observed_then_.origin()), (turn * observer_.quaternion()).normalized());
+  observer_ =
+      Pose(now.origin() + turn * (observer_.origin() - observed_then_.origin()), (turn * observer_.quaternion()).normalized());
   observed_then_ = now;
   if (halo_.needed()) surface_->touch_all();
   for (const Sphere& plug : plugs_)
-    for (const Pose* pose : {&before, const_cast<const Pose*>(&observer_)}) surface_->touch({pose->to_frame(plug.centre), plug.radius});
+    for (const Pose* pose : {&before, const_cast<const Pose*>(&observer_)})
+      surface_->touch({pose->to_frame(plug.centre), plug.radius});
   plugs_changed_ = plugs_changed_ || !plugs_.empty();
 }
 

@@ -53,7 +53,8 @@ GranuleMass FixSolidCull::mass_of(std::int64_t tag) const {
     const Pose &from = bodies_.pose(a.at.body), &to = bodies_.pose(bodies_.body_of(tag));
     return {a.mass, from == to ? a.at.position : to.to_frame(from.to_world(a.at.position)), a.radius};
   }
-  GranuleMass m = g ? GranuleMass{g->mass, g->position, g->radius} : GranuleMass{atom->rmass[*i], shell_[*i].place, atom->radius[*i]};
+  GranuleMass m =
+      g ? GranuleMass{g->mass, g->position, g->radius} : GranuleMass{atom->rmass[*i], shell_[*i].place, atom->radius[*i]};
   const int stands_in = g ? g->body : shell_[*i].body, body = bodies_.body_of(tag);
   if (body && stands_in != body) {
     const Pose &from = bodies_.pose(stands_in), &to = bodies_.pose(body);
@@ -66,7 +67,8 @@ MovingGranule FixSolidCull::moving(int i) const {
   const ShellEntry& e = shell_[i];
   // a granule that is locked has the motion that it had before
   const bool now = e.locked && e.lock_step == update->ntimestep;
-  return {atom->rmass[i], atom->radius[i], vec(atom->x[i]), now ? e.velocity : vec(atom->v[i]), now ? e.spin : vec(atom->omega[i])};
+  return {atom->rmass[i], atom->radius[i], vec(atom->x[i]), now ? e.velocity : vec(atom->v[i]),
+          now ? e.spin : vec(atom->omega[i])};
 }
 
 std::vector<FixSolidCull::Ball> FixSolidCull::collect_balls() {
@@ -97,7 +99,8 @@ void FixSolidCull::change_membership() {
   freed_keys_.assign(keys.begin(), keys.end());
   waking_bodies_.clear();
   const bool all = any_rank(wake_all_);
-  const bool change = any_rank(all || !balls_.empty() || !freed_keys_.empty() || !chosen_.empty() || !joins_.empty() || open_for_insertion_);
+  const bool change =
+      any_rank(all || !balls_.empty() || !freed_keys_.empty() || !chosen_.empty() || !joins_.empty() || open_for_insertion_);
   freed_.clear();
   locked_now_.clear();
   freed_anywhere_.clear();
@@ -160,7 +163,8 @@ void FixSolidCull::change_membership() {
 
 /// Unlocked granules leave their bodies, which may come apart.
 void FixSolidCull::free_from_bodies() {
-  std::map<std::pair<int, std::size_t>, Vec3> cuts;  // which ball took granules from which body, and its centre in the body's frame
+  std::map<std::pair<int, std::size_t>, Vec3>
+      cuts;  // which ball took granules from which body, and its centre in the body's frame
   for (const std::int64_t tag : freed_) {
     const int body = bodies_.body_of(tag), i = *index_of_.find(tag);
     const Vec3 x = bodies_.body(body).pose.to_world(shell_[i].place);
@@ -176,8 +180,8 @@ void FixSolidCull::free_from_bodies() {
     MovingGranule given{atom->rmass[i], atom->radius[i], x, vec(atom->v[i]), vec(atom->omega[i])};
     const double before = kinetic_energy(body);
     bodies_.unlock(tag, mass_of(tag), contacts_, back && rigid() ? &given : nullptr);
-    const double after = kinetic_energy(body) +
-                         RigidPart::granule(given.mass, given.radius, x, given.velocity, given.spin).kinetic_energy();
+    const double after =
+        kinetic_energy(body) + RigidPart::granule(given.mass, given.radius, x, given.velocity, given.spin).kinetic_energy();
     ledger_.restored(after - before);
     contacts_.erase(tag);
   }
@@ -371,9 +375,11 @@ void FixSolidCull::share_exterior() {
   std::vector<double> rows;
   for (int i = 0; i < atom->nlocal; ++i)
     if (!shell_[i].locked || store_bodies_ > 1)
-      rows.insert(rows.end(), {atom->x[i][0], atom->x[i][1], atom->x[i][2], atom->radius[i], double(shell_[i].locked ? key_of(shell_[i].body) : 0)});
+      rows.insert(rows.end(), {atom->x[i][0], atom->x[i][1], atom->x[i][2], atom->radius[i],
+                               double(shell_[i].locked ? key_of(shell_[i].body) : 0)});
   rows = halo_.exchange(rows, 5, contact_reach() + store_gap_in_skins * neighbor->skin + store_slack());
-  for (std::size_t r = 0; r < rows.size(); r += 5) halo_foreign_.push_back({{vec(&rows[r]), rows[r + 3]}, static_cast<int>(rows[r + 4])});
+  for (std::size_t r = 0; r < rows.size(); r += 5)
+    halo_foreign_.push_back({{vec(&rows[r]), rows[r + 3]}, static_cast<int>(rows[r + 4])});
 }
 
 void FixSolidCull::keep_shell_closed() {
@@ -396,7 +402,8 @@ void FixSolidCull::keep_shell_closed() {
   fetch_near_walls(near);
   if (open_for_insertion_)
     for (int f = 0; f < modify->nfix; ++f) {
-      if (std::strncmp(modify->fix[f]->style, "insert/pack", 11) != 0 && std::strncmp(modify->fix[f]->style, "insert/rate", 11) != 0)
+      if (std::strncmp(modify->fix[f]->style, "insert/pack", 11) != 0 &&
+          std::strncmp(modify->fix[f]->style, "insert/rate", 11) != 0)
         continue;
       const LAMMPS_NS::Region* region = engine::insertion_region(modify->fix[f]);
       if (!region || !region->bboxflag) continue;
@@ -437,9 +444,13 @@ void FixSolidCull::fetch_near_walls(std::set<std::int64_t>& near) {
     if (against_moving) seen.corners = std::move(corners);
     for (const WallContacts::Triangle& t : triangles)
       if (t.moving ? against_moving : against_still)
-        for_each_stored_in_box(t.box.lo - reach, t.box.hi + reach, [&](const StoredGranule& g) {
-          if (!near.count(g.tag) && walls_.near(t, {nearest_image(in_world(g), 0.5 * (t.box.lo + t.box.hi)), g.radius}, gap)) near.insert(g.tag);
-        }, body);
+        for_each_stored_in_box(
+            t.box.lo - reach, t.box.hi + reach,
+            [&](const StoredGranule& g) {
+              if (!near.count(g.tag) && walls_.near(t, {nearest_image(in_world(g), 0.5 * (t.box.lo + t.box.hi)), g.radius}, gap))
+                near.insert(g.tag);
+            },
+            body);
   });
   if (moved.empty()) return;
   store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
@@ -500,16 +511,17 @@ void FixSolidCull::forget_lost_atoms() {
 }
 
 void FixSolidCull::split_bodies() {
-  bodies_.split(contacts_, [&](std::int64_t tag) { return mass_of(tag); },
-                [&](std::int64_t tag, int body, const Vec3& place) {
-                  if (store_->find(tag)) {
-                    store_->move(tag, body, place);
-                    return;
-                  }
-                  ShellEntry& e = shell_[*index_of_.find(tag)];
-                  e.body = body;
-                  e.place = place;
-                });
+  bodies_.split(
+      contacts_, [&](std::int64_t tag) { return mass_of(tag); },
+      [&](std::int64_t tag, int body, const Vec3& place) {
+        if (store_->find(tag)) {
+          store_->move(tag, body, place);
+          return;
+        }
+        ShellEntry& e = shell_[*index_of_.find(tag)];
+        e.body = body;
+        e.place = place;
+      });
 }
 
 void FixSolidCull::freeze_contacts() {
@@ -524,14 +536,17 @@ void FixSolidCull::freeze_contacts() {
     if (!is_locked(a) || !is_locked(b)) continue;
     joined.insert({std::min(a, b), std::max(a, b)});
   }
-  // two bodies that touch stay two, and their contact the engine's, until a granule is locked that touches both, or they are joined
+  // two bodies that touch stay two, and their contact the engine's, until a granule is locked that touches both, or they are
+  // joined
   const auto freezes = [&](std::int64_t a, std::int64_t b) {
-    return is_locked(b) && (locked_anywhere_.contains(a) || locked_anywhere_.contains(b) || joined.count({std::min(a, b), std::max(a, b)}));
+    return is_locked(b) &&
+           (locked_anywhere_.contains(a) || locked_anywhere_.contains(b) || joined.count({std::min(a, b), std::max(a, b)}));
   };
   // the load of a contact that goes inside stays in the balance that the older granule was locked with (invariant I5)
   const auto rebase = [&](int i, std::int64_t partner, const double* history) {
     if (shell_[i].fresh) return;
-    if (const int* j = index_of_.find(partner)) shell_[i].reference -= bodies_.pose(shell_[i].body).turned_to_frame(pair_force_.on_first(i, *j, history));
+    if (const int* j = index_of_.find(partner))
+      shell_[i].reference -= bodies_.pose(shell_[i].body).turned_to_frame(pair_force_.on_first(i, *j, history));
   };
   fresh_contacts_.clear();
   for (int i = 0; i < atom->nlocal; ++i) {
@@ -541,7 +556,8 @@ void FixSolidCull::freeze_contacts() {
       if (!freezes(tag, partner)) return;
       if (!contacts_.contains(tag, partner)) {
         contacts_.add(tag, partner, nullptr);
-        if (contacts_.width()) fresh_contacts_.push_back({tag, partner, std::vector<double>(history, history + contacts_.width())});
+        if (contacts_.width())
+          fresh_contacts_.push_back({tag, partner, std::vector<double>(history, history + contacts_.width())});
       }
       rebase(i, partner, history);
     });
@@ -579,7 +595,9 @@ void FixSolidCull::freeze_inner_contacts() {
       fresh_contacts_.push_back({tag, partner, std::vector<double>(history, history + contacts_.width())});
       for (const int* end : {static_cast<const int*>(&i), j})
         if (end && !shell_[*end].fresh && j)
-          shell_[*end].reference -= bodies_.pose(shell_[*end].body).turned_to_frame(end == j ? Vec3(-pair_force_.on_first(i, *j, history)) : pair_force_.on_first(i, *j, history));
+          shell_[*end].reference -=
+              bodies_.pose(shell_[*end].body)
+                  .turned_to_frame(end == j ? Vec3(-pair_force_.on_first(i, *j, history)) : pair_force_.on_first(i, *j, history));
     });
   }
 }
@@ -590,9 +608,11 @@ void FixSolidCull::share_bodies() {
   std::vector<double> rows;
   for (int i = 0; i < atom->nlocal; ++i)
     if (shell_[i].locked)
-      rows.insert(rows.end(), {atom->x[i][0], atom->x[i][1], atom->x[i][2], double(atom->tag[i]), double(key_of(shell_[i].body))});
+      rows.insert(rows.end(),
+                  {atom->x[i][0], atom->x[i][1], atom->x[i][2], double(atom->tag[i]), double(key_of(shell_[i].body))});
   rows = halo_.exchange(rows, 5, contact_reach());
-  for (std::size_t r = 0; r < rows.size(); r += 5) ghost_body_[static_cast<std::int64_t>(rows[r + 3])] = static_cast<int>(rows[r + 4]);
+  for (std::size_t r = 0; r < rows.size(); r += 5)
+    ghost_body_[static_cast<std::int64_t>(rows[r + 3])] = static_cast<int>(rows[r + 4]);
 }
 
 void FixSolidCull::freeze_histories() {
@@ -650,7 +670,9 @@ void FixSolidCull::store_what_is_deep() {
     const int own = key_of(shell_[i].body);
     const Sphere s = sphere(i);
     bool near = shell_cells.any_near(s, gap, [&](std::size_t other) { return shell_body[other] != own; });
-    if (!near) for_each_stored_near(s, gap, [&](const StoredGranule&) { near = true; }, own);
+    if (!near)
+      for_each_stored_near(
+          s, gap, [&](const StoredGranule&) { near = true; }, own);
     return near;
   };
   for (int i = atom->nlocal - 1; i >= 0; --i) {
@@ -679,7 +701,8 @@ void FixSolidCull::publish_atom_counts() {
 }
 
 void FixSolidCull::label_bodies() {
-  for (int i = 0; i < atom->nlocal; ++i) vector_atom[i] = shell_[i].locked ? (comm->nprocs == 1 ? shell_[i].body : key_of(shell_[i].body)) : 0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    vector_atom[i] = shell_[i].locked ? (comm->nprocs == 1 ? shell_[i].body : key_of(shell_[i].body)) : 0;
 }
 
 void FixSolidCull::restore_all() {

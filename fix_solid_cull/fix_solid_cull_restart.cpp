@@ -64,7 +64,8 @@ class Reader {
 }  // namespace
 
 /// Granules, their bodies and their contacts as they stand in this rank's bodies. `all`: everything that is locked here.
-std::vector<double> FixSolidCull::serialise(const std::vector<std::int64_t>& stored, const std::vector<std::int64_t>& atoms, bool all) const {
+std::vector<double> FixSolidCull::serialise(const std::vector<std::int64_t>& stored, const std::vector<std::int64_t>& atoms,
+                                            bool all) const {
   Writer w;
   w.number(comm->me);
   for (const Pose* p : {&observer_, &observed_then_}) {
@@ -146,7 +147,8 @@ struct FixSolidCull::Block {
   std::vector<Edge> edges;
 };
 
-std::vector<FixSolidCull::Block> FixSolidCull::parse_blocks(const std::vector<double>& numbers, std::size_t from, std::size_t width) {
+std::vector<FixSolidCull::Block> FixSolidCull::parse_blocks(const std::vector<double>& numbers, std::size_t from,
+                                                            std::size_t width) {
   std::vector<Block> blocks;
   Reader in(numbers, from);
   while (in.more()) {
@@ -160,8 +162,7 @@ std::vector<FixSolidCull::Block> FixSolidCull::parse_blocks(const std::vector<do
     std::vector<int> layout;
     for (std::int64_t n = in.whole(); n > 0; --n) layout.push_back(records_.layout_from_text(in.text()));
     b.bodies.resize(static_cast<std::size_t>(in.number()));
-    for (SolidBody& body : b.bodies)
-      body.each_number([&](auto& x) { x = static_cast<std::decay_t<decltype(x)>>(in.number()); });
+    for (SolidBody& body : b.bodies) body.each_number([&](auto& x) { x = static_cast<std::decay_t<decltype(x)>>(in.number()); });
     for (std::int64_t n = in.whole(); n > 0; --n) {
       Block::Granule g;
       const std::int64_t tag = in.whole();
@@ -242,7 +243,8 @@ void FixSolidCull::take_up_as_it_was(const Block& b) {
   group_bodies();
 }
 
-/// Each rank takes the granules whose places it owns, with the motion that they have in their bodies, and ties them together anew.
+/// Each rank takes the granules whose places it owns, with the motion that they have in their bodies, and ties them together
+/// anew.
 void FixSolidCull::take_up(const std::vector<Block>& blocks) {
   struct Taken {
     const Block* block;
@@ -254,7 +256,8 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
       if (g.record) know_radius(g.stored.type, g.radius);
       const int* i = index_of_.find(tag);
       const bool here = i && shell_[*i].locked && shell_[*i].body == 0;  // an interface granule of a restart file
-      if (!bodies_.body_of(tag) && (here || halo_.owns(b.bodies[g.body].pose.to_world(g.place)))) taken.emplace(tag, Taken{&b, &g});
+      if (!bodies_.body_of(tag) && (here || halo_.owns(b.bodies[g.body].pose.to_world(g.place))))
+        taken.emplace(tag, Taken{&b, &g});
     }
   fresh_contacts_.clear();
   const auto ours = [&](std::int64_t tag) { return taken.count(tag) || bodies_.body_of(tag); };
@@ -324,7 +327,8 @@ void FixSolidCull::publish_restored() {
   label_bodies();
 }
 
-/// Granules of bodies go to the rank that owns their place: those in the store now, interface granules with the engine's exchange.
+/// Granules of bodies go to the rank that owns their place: those in the store now, interface granules with the engine's
+/// exchange.
 void FixSolidCull::hand_over() {
   arriving_.clear();
   if (comm->nprocs == 1) return;
@@ -357,8 +361,7 @@ void FixSolidCull::hand_over() {
   for (const std::int64_t tag : leaving) {
     std::vector<FreshContact> kept;
     contacts_.for_each(tag, [&](std::int64_t partner, const double* history) {
-      if (bodies_.body_of(partner))
-        kept.push_back({partner, tag, history ? contacts_.turned(history) : std::vector<double>()});
+      if (bodies_.body_of(partner)) kept.push_back({partner, tag, history ? contacts_.turned(history) : std::vector<double>()});
     });
     contacts_.erase(tag);
     for (const FreshContact& c : kept) contacts_.add(c.tag, c.partner, c.history.empty() ? nullptr : c.history.data());
@@ -418,9 +421,10 @@ void FixSolidCull::write_restart(FILE* file) {
   const std::vector<double> all = halo_.gather_root(mine);
   if (comm->me != 0) return;
   const int bytes = static_cast<int>(numbers * 8);
-  const double header[header_size + 1] = {double(numbers), file_mark, diameter_, weight_scale_, gravity_then_[0],
-                                          gravity_then_[1], gravity_then_[2], counters[0], counters[1], counters[2],
-                                          counters[3], 0.0, double(contacts_.width()), double(comm->nprocs)};
+  const double header[header_size + 1] = {
+      double(numbers),           file_mark,           diameter_,   weight_scale_, gravity_then_[0], gravity_then_[1],
+      gravity_then_[2],          counters[0],         counters[1], counters[2],   counters[3],      0.0,
+      double(contacts_.width()), double(comm->nprocs)};
   std::fwrite(&bytes, sizeof(int), 1, file);
   std::fwrite(header, sizeof(double), header_size + 1, file);
   std::fwrite(all.data(), sizeof(double), all.size(), file);

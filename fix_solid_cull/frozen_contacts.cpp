@@ -6,8 +6,7 @@
 namespace solidcull {
 
 void FrozenContacts::set_layout(std::vector<bool> flips) {
-  if (count_ != 0 && flips != flips_)
-    throw std::logic_error("the contact history's layout changed while contacts are frozen");
+  if (count_ != 0 && flips != flips_) throw std::logic_error("the contact history's layout changed while contacts are frozen");
   if (flips != flips_) {
     edges_.clear();
     histories_.clear();

@@ -1,11 +1,10 @@
 // Contacts between two locked granules. The engine excludes such pairs from its lists; their histories wait here, each once.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "flat_map.h"
 #include "sphere.h"
@@ -22,8 +21,8 @@ class FrozenContacts {
   const std::vector<bool>& layout() const { return flips_; }
   std::size_t width() const { return flips_.size(); }
 
-  /// Adds the contact of `tag` with `partner`, history as `tag` sees it (`width()` numbers, or nullptr: touching without history).
-  /// A contact that is there already keeps its place and takes the new history.
+  /// Adds the contact of `tag` with `partner`, history as `tag` sees it (`width()` numbers, or nullptr: touching without
+  /// history). A contact that is there already keeps its place and takes the new history.
   void add(std::int64_t tag, std::int64_t partner, const double* history);
 
   /// Calls visit(partner, history as `tag` sees it or nullptr) for each contact of `tag`.
@@ -85,8 +84,8 @@ class FrozenContacts {
   static constexpr int none = -1;
   static constexpr std::int64_t free_mark = INT64_MIN;
   struct Edge {
-    std::int64_t low, high;  // tags, low < high
-    int next_low, next_high; // the next edge in the list of either end
+    std::int64_t low, high;   // tags, low < high
+    int next_low, next_high;  // the next edge in the list of either end
     bool has_history;
   };
 

@@ -20,14 +20,14 @@ struct StoredGranule {
   std::int64_t tag = 0;
   int type = 0;
   int body = 0;
-  int layout = 0;             ///< which columns its record has; the adapter knows them
-  std::int64_t lock_step = 0; ///< time step at which it was locked
-  double normal_load = 0;     ///< sum of its normal contact forces at locking (N)
+  int layout = 0;                   ///< which columns its record has; the adapter knows them
+  std::int64_t lock_step = 0;       ///< time step at which it was locked
+  double normal_load = 0;           ///< sum of its normal contact forces at locking (N)
   Vec3 load_change = Vec3::Zero();  ///< F_ext - F_ext(at locking) that it carried when it went in (N): kept for invariant I5
 };
 
-/// Granules with their engine records (opaque doubles), found by tag in O(1) and by body and place in O(neighbours): each body has
-/// search cells in its own frame, so that a body that moves costs nothing here. Local to the rank.
+/// Granules with their engine records (opaque doubles), found by tag in O(1) and by body and place in O(neighbours): each body
+/// has search cells in its own frame, so that a body that moves costs nothing here. Local to the rank.
 class GranuleStore {
  public:
   /// cell: edge of the search cells in m; best near the largest contact distance. Throws std::invalid_argument if not > 0.
@@ -64,7 +64,7 @@ class GranuleStore {
   const double* record(std::int64_t tag, int& length) const;
 
   std::size_t size() const { return slot_of_.size(); }
-  double mass() const;                 ///< sum over all, compensated (kg)
+  double mass() const;                                       ///< sum over all, compensated (kg)
   double largest_radius() const { return largest_radius_; }  ///< of all that ever went in (m)
 
   /// Calls visit(granule) for each of this body whose surface is closer than `gap` to the surface of the sphere, given in the
@@ -112,12 +112,12 @@ class GranuleStore {
     StoredGranule granule;
     std::size_t offset = 0;  // of the record in its pool
     int length = 0;
-    int next = none;         // next granule in the cell, or next free slot
+    int next = none;  // next granule in the cell, or next free slot
   };
   struct Cell {
     int head = none;
     int count_here = 0;
-    int count_around = 0;    // granules in the 27 cells around: what lets most queries end after one look
+    int count_around = 0;  // granules in the 27 cells around: what lets most queries end after one look
   };
   struct Grid {
     FlatMap<Cell> cells;
@@ -131,7 +131,8 @@ class GranuleStore {
   };
 
   std::array<std::int64_t, 3> cell_of(const Vec3& p) const {
-    return {static_cast<std::int64_t>(std::floor(p[0] * inverse_cell_)), static_cast<std::int64_t>(std::floor(p[1] * inverse_cell_)),
+    return {static_cast<std::int64_t>(std::floor(p[0] * inverse_cell_)),
+            static_cast<std::int64_t>(std::floor(p[1] * inverse_cell_)),
             static_cast<std::int64_t>(std::floor(p[2] * inverse_cell_))};
   }
   static std::int64_t key(std::int64_t i, std::int64_t j, std::int64_t k) {
@@ -154,8 +155,8 @@ class GranuleStore {
   double largest_radius_ = 0;
   std::vector<Slot> slots_;
   int first_free_ = none;
-  std::vector<Pool> pools_;  // by record length
-  FlatMap<int> slot_of_;     // tag -> slot
+  std::vector<Pool> pools_;    // by record length
+  FlatMap<int> slot_of_;       // tag -> slot
   std::map<int, Grid> grids_;  // by body
 };
 

@@ -36,7 +36,8 @@ Vec3 PairForce::on_first(int i, int at) {
 
 Vec3 PairForce::on_first(int i, int j, const double* history) {
   const int width = static_cast<LAMMPS_NS::PairGran*>(force->pair)->dnum();
-  return compute(i, j, history != nullptr, history ? std::vector<double>(history, history + width) : std::vector<double>(width, 0.0));
+  return compute(i, j, history != nullptr,
+                 history ? std::vector<double>(history, history + width) : std::vector<double>(width, 0.0));
 }
 
 Vec3 PairForce::compute(int i, int neighbour, int flag, std::vector<double> history) {

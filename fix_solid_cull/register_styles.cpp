@@ -1,5 +1,6 @@
-// Makes the two styles known to an unmodified LIGGGHTS. Fix styles stand in a table; region styles in an if-chain, so the engine's
-// own Domain::add_region is interposed: this library comes before libliggghts.so in the search for symbols, and asks for the next.
+// Makes the two styles known to an unmodified LIGGGHTS. Fix styles stand in a table; region styles in an if-chain, so the
+// engine's own Domain::add_region is interposed: this library comes before libliggghts.so in the search for symbols, and asks for
+// the next.
 #include <dlfcn.h>
 
 #include <cstring>

@@ -42,8 +42,8 @@ class RigidMotion {
 
   /// Momentum changes by force (N) and torque about the centre (N m) over dt (s).
   void kick(const Vec3& force, const Vec3& torque, double dt);
-  /// Moves over dt (s) with the momentum that it has: translation exact, rotation by the midpoint rule for the free top, of second
-  /// order, which keeps the angular momentum to the last bit. Returns what was done to space.
+  /// Moves over dt (s) with the momentum that it has: translation exact, rotation by the midpoint rule for the free top, of
+  /// second order, which keeps the angular momentum to the last bit. Returns what was done to space.
   RigidStep drift(double dt);
   void shift(const Vec3& by) { centre_ += by; }
 
@@ -76,8 +76,8 @@ class RigidMotion {
 
   double mass_ = 0;
   Vec3 centre_ = Vec3::Zero(), velocity_ = Vec3::Zero(), angular_momentum_ = Vec3::Zero();
-  Eigen::Matrix3d inverse_inertia_ = Eigen::Matrix3d::Zero();           // as it stood when the body was tied together
-  Eigen::Quaterniond turned_ = Eigen::Quaterniond::Identity();          // since then
+  Eigen::Matrix3d inverse_inertia_ = Eigen::Matrix3d::Zero();   // as it stood when the body was tied together
+  Eigen::Quaterniond turned_ = Eigen::Quaterniond::Identity();  // since then
   FreeAxes free_{true, true, true};
   bool all_free_ = true;
 };

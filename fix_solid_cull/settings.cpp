@@ -19,8 +19,7 @@ class Values {
   std::size_t end() const { return at_; }
 
   const std::string& word(const char* wanted) {
-    if (at_ >= words_.size())
-      throw InputError("keyword '" + words_[keyword_] + "' ends too early: give " + wanted);
+    if (at_ >= words_.size()) throw InputError("keyword '" + words_[keyword_] + "' ends too early: give " + wanted);
     return words_[at_++];
   }
   double number(const char* wanted, double least, bool least_allowed, double most = HUGE_VAL) {
@@ -66,9 +65,12 @@ using Reader = std::function<void(Values&, Settings&)>;
 const std::map<std::string, Reader>& readers() {
   static const std::map<std::string, Reader> table = {
       {"every", [](Values& v, Settings& s) { s.every = v.whole("a whole number of steps, 1 or more", 1); }},
-      {"depth", [](Values& v, Settings& s) { s.depth = v.number("a number of mean diameters, more than 0 and at most 50", 0, false, 50); }},
+      {"depth", [](Values& v,
+                   Settings& s) { s.depth = v.number("a number of mean diameters, more than 0 and at most 50", 0, false, 50); }},
       {"exterior",
-       [](Values& v, Settings& s) { v.one_of("'live'", {{"live", [&] { s.exterior = Exterior::live; }}}); }},
+       [](Values& v, Settings& s) {
+         v.one_of("'live'", {{"live", [&] { s.exterior = Exterior::live; }}});
+       }},
       {"speed", [](Values& v, Settings& s) { s.speed = v.number("a fraction of sqrt(g d), more than 0", 0, false); }},
       {"calm", [](Values& v, Settings& s) { s.calm = v.whole("a whole number of looks, 1 or more", 1); }},
       {"tolerance",
@@ -87,15 +89,22 @@ const std::map<std::string, Reader>& readers() {
        }},
       {"motion",
        [](Values& v, Settings& s) {
-         v.one_of("'rigid' or 'fixed'", {{"rigid", [&] { s.motion = Motion::rigid; }}, {"fixed", [&] { s.motion = Motion::fixed; }}});
+         v.one_of("'rigid' or 'fixed'",
+                  {{"rigid", [&] { s.motion = Motion::rigid; }}, {"fixed", [&] { s.motion = Motion::fixed; }}});
        }},
       {"walls",
        [](Values& v, Settings& s) {
          v.one_of("'closed' or 'surface'",
                   {{"closed", [&] { s.walls = Walls::closed; }}, {"surface", [&] { s.walls = Walls::surface; }}});
        }},
-      {"store", [](Values& v, Settings& s) { v.one_of("'exact'", {{"exact", [&] { s.store = Store::exact; }}}); }},
-      {"restore", [](Values& v, Settings& s) { v.one_of("'exact'", {{"exact", [&] { s.restore = Restore::exact; }}}); }},
+      {"store",
+       [](Values& v, Settings& s) {
+         v.one_of("'exact'", {{"exact", [&] { s.store = Store::exact; }}});
+       }},
+      {"restore",
+       [](Values& v, Settings& s) {
+         v.one_of("'exact'", {{"exact", [&] { s.restore = Restore::exact; }}});
+       }},
       {"voxel", [](Values& v, Settings& s) { s.voxel = v.number("a size in mean diameters, 0.1 to 2", 0.1, true, 2.0); }},
       {"mesh",
        [](Values& v, Settings& s) {

@@ -19,22 +19,22 @@ struct Output {
 };
 
 struct Settings {
-  int every = 0;                 ///< steps between looks; 0: from the deck's own scales, see look_interval()
-  double depth = 2.0;            ///< cover, in mean granule diameters
+  int every = 0;       ///< steps between looks; 0: from the deck's own scales, see look_interval()
+  double depth = 2.0;  ///< cover, in mean granule diameters
   Exterior exterior = Exterior::live;
-  double speed = 0.01;           ///< solid-state tolerance, fraction of sqrt(g d)
-  int calm = 3;                  ///< looks in a row
-  double tolerance_absolute = 3; ///< A of the wake-up law, in granule weights
-  double tolerance_relative = 0; ///< R of the wake-up law, in normal loads at locking
-  double carve_radius = 2.0;     ///< r0, in mean diameters
-  double carve_cap = 4.0;        ///< largest growth of r0
+  double speed = 0.01;            ///< solid-state tolerance, fraction of sqrt(g d)
+  int calm = 3;                   ///< looks in a row
+  double tolerance_absolute = 3;  ///< A of the wake-up law, in granule weights
+  double tolerance_relative = 0;  ///< R of the wake-up law, in normal loads at locking
+  double carve_radius = 2.0;      ///< r0, in mean diameters
+  double carve_cap = 4.0;         ///< largest growth of r0
   Motion motion = Motion::rigid;
   Walls walls = Walls::closed;
   Store store = Store::exact;
   Restore restore = Restore::exact;
-  double voxel = 0.5;            ///< in mean diameters
-  std::vector<Output> meshes;    ///< interface meshes; the keyword may stand more than once
-  std::vector<Output> beds;      ///< the whole bed; likewise
+  double voxel = 0.5;          ///< in mean diameters
+  std::vector<Output> meshes;  ///< interface meshes; the keyword may stand more than once
+  std::vector<Output> beds;    ///< the whole bed; likewise
 };
 
 /// Parses `keyword value ...`. Throws InputError that names keyword and value as typed, and what to do.

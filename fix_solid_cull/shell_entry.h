@@ -13,27 +13,27 @@ namespace solidcull {
 struct ShellEntry {
   // interface granules
   bool locked = false;
-  bool fresh = false;                     ///< the reference load is taken in this step
-  int body = 0;                           ///< the body in whose frame it stands, on this rank
-  Vec3 place = Vec3::Zero();              ///< in the body's frame (m)
-  Vec3 reference = Vec3::Zero();          ///< F_ext at locking, re-based when contacts change sides; frame of the body (N). Of an
-                                          ///< exterior granule: acceleration of what it touched when calm began (m/s^2)
-  Vec3 load_change = Vec3::Zero();        ///< F_ext - reference at the last step; frame of the body (N)
-  double normal_load = 0;                 ///< sum of normal contact forces at locking (N), for the relative tolerance
-  double excess = 0;                      ///< largest load change over tolerance since the last wake-up
-  std::int64_t lock_step = -1;            ///< of an exterior granule: when calm began
-  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< at locking, given back only if no step has passed. Of an exterior granule:
-                                                      ///< its velocity when calm began
+  bool fresh = false;               ///< the reference load is taken in this step
+  int body = 0;                     ///< the body in whose frame it stands, on this rank
+  Vec3 place = Vec3::Zero();        ///< in the body's frame (m)
+  Vec3 reference = Vec3::Zero();    ///< F_ext at locking, re-based when contacts change sides; frame of the body (N). Of an
+                                    ///< exterior granule: acceleration of what it touched when calm began (m/s^2)
+  Vec3 load_change = Vec3::Zero();  ///< F_ext - reference at the last step; frame of the body (N)
+  double normal_load = 0;           ///< sum of normal contact forces at locking (N), for the relative tolerance
+  double excess = 0;                ///< largest load change over tolerance since the last wake-up
+  std::int64_t lock_step = -1;      ///< of an exterior granule: when calm began
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< at locking, given back only if no step has passed. Of an exterior
+                                                      ///< granule: its velocity when calm began
 
   // all granules
-  int walls = 0;                          ///< walls and triangles touched at the last look
-  bool wall_moves = false;                ///< one of them can move
-  bool wall_near = true;                  ///< within the skin of a wall; true until a look has seen that it is not
+  int walls = 0;            ///< walls and triangles touched at the last look
+  bool wall_moves = false;  ///< one of them can move
+  bool wall_near = true;    ///< within the skin of a wall; true until a look has seen that it is not
 
   // exterior granules
-  int calm = 0;                           ///< looks in a row in solid state; of an interface granule: at rest against another body
-  int waited = 0;                         ///< looks since it could have been culled
-  bool registered = false;                ///< known to the implicit surface
+  int calm = 0;             ///< looks in a row in solid state; of an interface granule: at rest against another body
+  int waited = 0;           ///< looks since it could have been culled
+  bool registered = false;  ///< known to the implicit surface
   Vec3 registered_at = Vec3::Zero();
   Voxel nearest_void = Voxel::nothing();
 
@@ -47,11 +47,13 @@ struct ShellEntry {
   }
   static constexpr int packed_size = 26;
   void pack(double* to) const {
-    const double values[packed_size] = {
-        double(locked), double(fresh), reference[0], reference[1], reference[2], load_change[0], load_change[1], load_change[2],
-        normal_load, excess, double(wall_moves), double(lock_step), velocity[0], velocity[1], velocity[2], spin[0], spin[1],
-        spin[2], double(walls), double(wall_near), double(calm), double(waited), double(registered), registered_at[0],
-        registered_at[1], registered_at[2]};
+    const double values[packed_size] = {double(locked),   double(fresh),   reference[0],       reference[1],
+                                        reference[2],     load_change[0],  load_change[1],     load_change[2],
+                                        normal_load,      excess,          double(wall_moves), double(lock_step),
+                                        velocity[0],      velocity[1],     velocity[2],        spin[0],
+                                        spin[1],          spin[2],         double(walls),      double(wall_near),
+                                        double(calm),     double(waited),  double(registered), registered_at[0],
+                                        registered_at[1], registered_at[2]};
     for (int k = 0; k < packed_size; ++k) to[k] = values[k];
   }
   static ShellEntry unpack(const double* v) {

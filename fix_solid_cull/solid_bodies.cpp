@@ -23,7 +23,8 @@ void MassProperties::add(const MassProperties& other, int sign) {
   count += sign * other.count;
   mass += sign * other.mass;
   first += sign * (other.first + other.mass * arm);
-  second += sign * (other.second + other.first * arm.transpose() + arm * other.first.transpose() + other.mass * arm * arm.transpose());
+  second +=
+      sign * (other.second + other.first * arm.transpose() + arm * other.first.transpose() + other.mass * arm * arm.transpose());
   spin += sign * other.spin;
 }
 
@@ -84,7 +85,8 @@ int SolidBodies::found(const SolidBody& body) {
   return number;
 }
 
-/// The mean acceleration is that of the centre of mass: where the centre is another one now, the velocity that it began with is too.
+/// The mean acceleration is that of the centre of mass: where the centre is another one now, the velocity that it began with is
+/// too.
 void SolidBodies::centre_moved(SolidBody& body, const Vec3& from) {
   const Vec3 to = body.pose.to_world(body.mass.centre());
   body.velocity_then += body.twist.spin.cross(to - from);
@@ -179,7 +181,8 @@ void SolidBodies::join(std::int64_t a, std::int64_t b, const MassOf& mass_of) {
   tie(of_a, in_a, of_b, bodies_[of_b].pose.to_world(mass_of(b).position));
 }
 
-void SolidBodies::unlock(std::int64_t tag, const GranuleMass& granule, const FrozenContacts& contacts, const MovingGranule* given) {
+void SolidBodies::unlock(std::int64_t tag, const GranuleMass& granule, const FrozenContacts& contacts,
+                         const MovingGranule* given) {
   const int number = body_of(tag);
   if (!number) return;
   member_.erase(tag);

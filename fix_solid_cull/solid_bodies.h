@@ -19,16 +19,16 @@ namespace solidcull {
 /// that nothing is lost to a far origin.
 struct MassProperties {
   std::int64_t count = 0;
-  Vec3 about = Vec3::Zero();                          ///< the point: where the first granule was (m)
-  double mass = 0;                                    ///< kg
-  Vec3 first = Vec3::Zero();                          ///< sum of m (x - about)
-  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();   ///< sum of m (x - about) (x - about)^T
-  double spin = 0;                                    ///< sum of 2/5 m r^2, each granule's own inertia
+  Vec3 about = Vec3::Zero();                         ///< the point: where the first granule was (m)
+  double mass = 0;                                   ///< kg
+  Vec3 first = Vec3::Zero();                         ///< sum of m (x - about)
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();  ///< sum of m (x - about) (x - about)^T
+  double spin = 0;                                   ///< sum of 2/5 m r^2, each granule's own inertia
 
   void add(double m, const Vec3& x, double r, int sign = 1);
   void add(const MassProperties& other, int sign = 1);
-  Vec3 centre() const { return about + first / mass; }   ///< m; undefined for no mass
-  Eigen::Matrix3d inertia() const;                       ///< about the centre of mass, kg m^2
+  Vec3 centre() const { return about + first / mass; }                  ///< m; undefined for no mass
+  Eigen::Matrix3d inertia() const;                                      ///< about the centre of mass, kg m^2
   MassProperties seen_from(const Pose& here, const Pose& there) const;  ///< the same granules in another frame
 };
 
@@ -47,19 +47,19 @@ struct MovingGranule {
 
 struct SolidBody {
   Pose pose;
-  MassProperties mass;           ///< frame of the body; of this rank's part
-  Twist twist;                   ///< its velocity field
-  RigidMotion motion;            ///< of the whole body, over all ranks; current after the adapter has settled it
-  bool changed = true;           ///< since its motion was last settled
-  bool spanned = false;          ///< a part of a body over several ranks when its motion was last settled
-  std::array<bool, 3> spans{};   ///< tied to its own periodic image in these directions
-  std::int64_t summed = 0;       ///< count when the sums were last made from scratch
+  MassProperties mass;          ///< frame of the body; of this rank's part
+  Twist twist;                  ///< its velocity field
+  RigidMotion motion;           ///< of the whole body, over all ranks; current after the adapter has settled it
+  bool changed = true;          ///< since its motion was last settled
+  bool spanned = false;         ///< a part of a body over several ranks when its motion was last settled
+  std::array<bool, 3> spans{};  ///< tied to its own periodic image in these directions
+  std::int64_t summed = 0;      ///< count when the sums were last made from scratch
   // wake-up (DESIGN section 8)
-  Vec3 felt = Vec3::Zero();      ///< effective gravity at locking, frame of the body (m/s^2)
+  Vec3 felt = Vec3::Zero();  ///< effective gravity at locking, frame of the body (m/s^2)
   bool felt_known = false;
   Vec3 velocity_then = Vec3::Zero();  ///< of the centre, when the window of the mean acceleration began (m/s)
   std::int64_t step_then = -1;
-  Vec3 acceleration = Vec3::Zero();   ///< mean over the last window (m/s^2)
+  Vec3 acceleration = Vec3::Zero();  ///< mean over the last window (m/s^2)
 
   /// Calls visit(number) with a reference to each number of the state, in one order: to write it to a file and to read it back.
   template <class Visit>
@@ -93,7 +93,7 @@ struct SolidBody {
     vector(acceleration);
   }
 
-  RigidPart part() const;        ///< this rank's part, world frame
+  RigidPart part() const;  ///< this rank's part, world frame
   FreeAxes free_axes() const;
 };
 
@@ -122,21 +122,22 @@ class SolidBodies {
   /// Two locked granules are tied together by a contact that is frozen now: their bodies merge if they were two.
   void join(std::int64_t a, std::int64_t b, const MassOf& mass_of);
 
-  /// A granule is unlocked and goes on with the body's own velocity field: the body's motion does not change (paper: it "chips off
-  /// without affecting the momentum"). `given`: the granule goes on with a motion of its own instead, and the body keeps the rest
-  /// of the momentum. Call before its contacts are erased; afterwards call split() once for all that were unlocked together.
+  /// A granule is unlocked and goes on with the body's own velocity field: the body's motion does not change (paper: it "chips
+  /// off without affecting the momentum"). `given`: the granule goes on with a motion of its own instead, and the body keeps the
+  /// rest of the momentum. Call before its contacts are erased; afterwards call split() once for all that were unlocked together.
   void unlock(std::int64_t tag, const GranuleMass& granule, const FrozenContacts& contacts, const MovingGranule* given = nullptr);
 
   /// Bodies that came apart through the unlock() calls since the last split() become several, each with the velocity field that
   /// they had. Searches all cut edges at once and stops when one search is left, so its cost goes with the smaller parts. Calls
-  /// moved(tag, new body, place there) for each granule of a part that came off; the place is another one where the body was tied to its
-  /// own periodic image and the part is not.
-  void split(const FrozenContacts& contacts, const MassOf& mass_of, const std::function<void(std::int64_t, int, const Vec3&)>& moved);
+  /// moved(tag, new body, place there) for each granule of a part that came off; the place is another one where the body was tied
+  /// to its own periodic image and the part is not.
+  void split(const FrozenContacts& contacts, const MassOf& mass_of,
+             const std::function<void(std::int64_t, int, const Vec3&)>& moved);
 
   /// Bodies that lost a part in the last split().
   const std::vector<int>& split_parents() const { return split_parents_; }
 
-  int body_of(std::int64_t tag) const;                 ///< 0 if not locked on this rank
+  int body_of(std::int64_t tag) const;  ///< 0 if not locked on this rank
   SolidBody& body(int number) { return bodies_.at(number); }
   const SolidBody& body(int number) const { return bodies_.at(number); }
   /// Frame of a body, or of one that was swallowed and whose granules have not been moved yet.
@@ -150,7 +151,8 @@ class SolidBodies {
     member_.for_each([&](std::int64_t tag, int body) { visit(tag, root(body)); });
   }
 
-  /// Swallowed bodies with the frames that they had; their granules' places must be moved to the frames of root(). Then forget them.
+  /// Swallowed bodies with the frames that they had; their granules' places must be moved to the frames of root(). Then forget
+  /// them.
   const std::map<int, Pose>& swallowed() const { return swallowed_; }
   int root(int body) const;
   void forget_swallowed() { swallowed_.clear(); }
@@ -168,11 +170,11 @@ class SolidBodies {
   void sum_anew(int number, std::int64_t member, const FrozenContacts& contacts, const MassOf& mass_of);
 
   Vec3 periods_ = Vec3::Zero();
-  FlatMap<int> member_;                    // tag -> body, to be resolved by root()
-  mutable std::vector<int> parent_{0};     // union-find over body numbers; 0 is no body
-  std::map<int, SolidBody> bodies_;        // living bodies only
+  FlatMap<int> member_;                 // tag -> body, to be resolved by root()
+  mutable std::vector<int> parent_{0};  // union-find over body numbers; 0 is no body
+  std::map<int, SolidBody> bodies_;     // living bodies only
   std::map<int, Pose> swallowed_;
-  std::vector<std::int64_t> cut_;          // locked neighbours of unlocked granules
+  std::vector<std::int64_t> cut_;  // locked neighbours of unlocked granules
   std::vector<std::pair<int, int>> merges_;
   std::vector<int> split_parents_;
 };

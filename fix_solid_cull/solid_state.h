@@ -17,13 +17,13 @@ inline Vec3 contact_velocity(const MovingSphere& a, const MovingSphere& b) {
 }
 
 struct SolidStateLaw {
-  double speed;                     ///< largest relative velocity at a contact, and in a fixed body of the granule itself (m/s)
-  double force;                     ///< largest out-of-balance force in granule weights
-  double gravity;                   ///< |g| in m/s^2
-  int looks;                        ///< looks in a row
-  static constexpr double gap = 0.01;                 ///< touching within this share of the radii's sum counts as contact
-  static constexpr double drift_share = 0.05;         ///< of `speed`, for granules without a loaded contact
-  static constexpr double out_of_balance_share = 0.25; ///< of the wake-up tolerance A
+  double speed;    ///< largest relative velocity at a contact, and in a fixed body of the granule itself (m/s)
+  double force;    ///< largest out-of-balance force in granule weights
+  double gravity;  ///< |g| in m/s^2
+  int looks;       ///< looks in a row
+  static constexpr double gap = 0.01;                   ///< touching within this share of the radii's sum counts as contact
+  static constexpr double drift_share = 0.05;           ///< of `speed`, for granules without a loaded contact
+  static constexpr double out_of_balance_share = 0.25;  ///< of the wake-up tolerance A
 
   bool quiet_contact(const MovingSphere& a, const MovingSphere& b) const {
     return contact_velocity(a, b).squaredNorm() < speed * speed;
@@ -36,11 +36,12 @@ struct SolidStateLaw {
   bool at_rest(const Vec3& velocity, const Vec3& spin, double radius) const {
     return velocity.squaredNorm() < speed * speed && spin.squaredNorm() * radius * radius < speed * speed;
   }
-  /// Since calm began it has kept its velocity, or changed it as its neighbours' acceleration of then makes it: nothing has struck it,
-  /// and the frame in which it rests is not shaken.
+  /// Since calm began it has kept its velocity, or changed it as its neighbours' acceleration of then makes it: nothing has
+  /// struck it, and the frame in which it rests is not shaken.
   bool went_on(const Vec3& velocity_change, const Vec3& acceleration_then, const Vec3& acceleration_now, double seconds) const {
     return balanced(acceleration_now, acceleration_then) &&
-           (velocity_change.squaredNorm() < speed * speed || (velocity_change - seconds * acceleration_then).squaredNorm() < speed * speed);
+           (velocity_change.squaredNorm() < speed * speed ||
+            (velocity_change - seconds * acceleration_then).squaredNorm() < speed * speed);
   }
   /// In balance in the frame that moves with its neighbours: its acceleration against theirs (m/s^2).
   bool balanced(const Vec3& acceleration, const Vec3& of_neighbours) const {

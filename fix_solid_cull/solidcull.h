@@ -10,7 +10,8 @@ extern "C" {
 /* Makes `fix … solid/cull` known to this instance. lammps: what lammps_open gave, or a LAMMPS*. Local. */
 void solidcull_register(void* lammps);
 
-/* `region ID interface/mesh FIX-ID …` where the engine's own region command cannot be reached: the words after `region`. Local. */
+/* `region ID interface/mesh FIX-ID …` where the engine's own region command cannot be reached: the words after `region`. Local.
+ */
 void solidcull_region(void* lammps, int words, char** word);
 
 /* The version, as "major.minor.patch". */

@@ -7,14 +7,15 @@ namespace solidcull {
 
 /// The error control: an absolute and a relative tolerance, as in an ODE solver.
 struct WakeUpLaw {
-  double absolute;       ///< A, in granule weights
-  double relative;       ///< R, in normal loads at locking
-  double gravity;        ///< |g| in m/s^2
-  double carve_radius;   ///< r0 in m
-  double carve_cap;      ///< largest growth of r0
+  double absolute;                       ///< A, in granule weights
+  double relative;                       ///< R, in normal loads at locking
+  double gravity;                        ///< |g| in m/s^2
+  double carve_radius;                   ///< r0 in m
+  double carve_cap;                      ///< largest growth of r0
   static constexpr double growth = 0.5;  ///< c of the carve law
-  static constexpr double direction_share = 1.0 / 120, size_share = 1.0 / 12;  ///< for A = 1: 2.5 % and 25 % at the default tolerance
-  static constexpr double small_body = 300;                                    ///< granules: below, the shares grow, tenfold at most
+  static constexpr double direction_share = 1.0 / 120,
+                          size_share = 1.0 / 12;  ///< for A = 1: 2.5 % and 25 % at the default tolerance
+  static constexpr double small_body = 300;       ///< granules: below, the shares grow, tenfold at most
 
   /// Largest load change (N) that a granule of this mass (kg) and normal load at locking (N) sleeps through.
   double tolerance(double mass, double normal_load) const { return absolute * mass * gravity + relative * normal_load; }
@@ -22,9 +23,9 @@ struct WakeUpLaw {
   /// |F_ext - F_ext(at locking)| over the tolerance; the granule wakes above 1.
   double excess(const Vec3& load, const Vec3& load_at_locking, double mass, double normal_load) const;
 
-  /// Effective gravity (g less the body's acceleration, in the body's frame) against what it was at locking: beyond a share of |g|
-  /// the whole body wakes. Direction counts ten times as much as size, for what a packing bears depends on the direction of its
-  /// load. A body of a few granules has all of them at its shell, where each one's own load is watched: its share is larger.
+  /// Effective gravity (g less the body's acceleration, in the body's frame) against what it was at locking: beyond a share of
+  /// |g| the whole body wakes. Direction counts ten times as much as size, for what a packing bears depends on the direction of
+  /// its load. A body of a few granules has all of them at its shell, where each one's own load is watched: its share is larger.
   bool gravity_changed(const Vec3& now, const Vec3& at_locking, double granules) const;
 
   /// Radius (m) of the ball that a waking granule carves: r0 (1 + c log2(excess)), at most cap r0. excess >= 1.

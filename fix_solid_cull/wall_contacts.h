@@ -10,16 +10,16 @@
 namespace LAMMPS_NS {
 class FixWallGran;
 class TriMesh;
-}
+}  // namespace LAMMPS_NS
 
 namespace solidcull {
 
 /// An owned granule within the skin of a wall. Lengths in m, world frame.
 struct WallContact {
-  int granule;      ///< index of the owned atom
-  Vec3 to_wall;     ///< from the granule's centre to the nearest point of the wall
-  double gap;       ///< surface to wall; negative: overlap
-  bool moving;      ///< the wall can move
+  int granule;   ///< index of the owned atom
+  Vec3 to_wall;  ///< from the granule's centre to the nearest point of the wall
+  double gap;    ///< surface to wall; negative: overlap
+  bool moving;   ///< the wall can move
 };
 
 /// Local to the rank.

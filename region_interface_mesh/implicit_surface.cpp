@@ -37,9 +37,7 @@ double squared_gap(double x, std::int32_t block) {
 }
 
 /// Blocks whose interval of voxel centres meets [lo, hi].
-std::int32_t first_block(double lo) {
-  return static_cast<std::int32_t>(std::ceil((lo - (block_edge - 1)) / block_edge));
-}
+std::int32_t first_block(double lo) { return static_cast<std::int32_t>(std::ceil((lo - (block_edge - 1)) / block_edge)); }
 std::int32_t last_block(double hi) { return static_cast<std::int32_t>(std::floor(hi / block_edge)); }
 
 // Rounding may not drop a sphere or a block; the exact tests come after this margin (voxels).
@@ -209,9 +207,7 @@ struct ImplicitSurface::Impl {
       d2 = other_d2;
       voxel = v;
     }
-    static bool before(const Voxel& a, const Voxel& b) {
-      return a.i != b.i ? a.i < b.i : a.j != b.j ? a.j < b.j : a.k < b.k;
-    }
+    static bool before(const Voxel& a, const Voxel& b) { return a.i != b.i ? a.i < b.i : a.j != b.j ? a.j < b.j : a.k < b.k; }
   };
 
   void scan(const BlockKey& key, std::int32_t state, const Vec3& p, Nearest& nearest) const {
@@ -246,8 +242,10 @@ struct ImplicitSurface::Impl {
     const auto look = [&](const BlockKey& key, double gap2) {
       const std::int32_t state = state_of(key);
       if (state == Block::solid) return;
-      if (state == Block::stale) pending.push_back({gap2, key});
-      else scan(key, state, p, nearest);
+      if (state == Block::stale)
+        pending.push_back({gap2, key});
+      else
+        scan(key, state, p, nearest);
     };
     look(home, 0.0);
     const double r = reach + rounding_margin;

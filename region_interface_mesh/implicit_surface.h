@@ -27,8 +27,8 @@ struct Voxel {
 /// voxel * (i, j, k). Lengths in m, world frame; local to the rank.
 class ImplicitSurface {
  public:
-  /// Calls `visit` with every sphere (granule, halo granule, wall plug) that may overlap the box lo..hi. The visitor tests overlap
-  /// itself, so giving more is allowed, giving less is not.
+  /// Calls `visit` with every sphere (granule, halo granule, wall plug) that may overlap the box lo..hi. The visitor tests
+  /// overlap itself, so giving more is allowed, giving less is not.
   using Gather = std::function<void(const Vec3& lo, const Vec3& hi, const std::function<void(const Sphere&)>& visit)>;
 
   /// voxel > 0, closing >= 0, in m; throws std::invalid_argument otherwise.
@@ -44,14 +44,14 @@ class ImplicitSurface {
   /// `hint`: a voxel found earlier for this point; if it is still void and in reach, it is returned after one look.
   Voxel void_within(const Vec3& p, double depth, const Voxel& hint = Voxel::nothing());
 
-  bool is_void(const Voxel& v);             ///< evaluates the block if needed
-  Vec3 centre(const Voxel& v) const;        ///< m, world frame
+  bool is_void(const Voxel& v);       ///< evaluates the block if needed
+  Vec3 centre(const Voxel& v) const;  ///< m, world frame
 
   /// Depth of p, or `max_depth` if it is deeper; negative outside the closed granules, down to -closing. Never less than the true
   /// depth; more by a voxel's diagonal at most where the void is wider than that, and by a quarter of a voxel on average.
   double depth(const Vec3& p, double max_depth);
 
-  std::size_t blocks_evaluated() const;     ///< since construction: the work counter that benchmarks report
+  std::size_t blocks_evaluated() const;  ///< since construction: the work counter that benchmarks report
   std::size_t blocks_held() const;
   /// Whether a block within `reach` of p was touched since the last clear_touched(): whether its depth may have changed.
   bool touched_near(const Vec3& p, double reach) const;

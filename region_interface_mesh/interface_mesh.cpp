@@ -1,16 +1,7 @@
 #include "interface_mesh.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <mutex>
-#include <optional>
-#include <sstream>
-#include <stdexcept>
-#include <variant>
-
-#include <openvdb/openvdb.h>
 #include <openvdb/io/Stream.h>
+#include <openvdb/openvdb.h>
 #include <openvdb/tools/Composite.h>
 #include <openvdb/tools/GridTransformer.h>
 #include <openvdb/tools/Interpolation.h>
@@ -21,6 +12,15 @@
 #include <openvdb/tools/VolumeToMesh.h>
 #include <openvdb/tree/LeafManager.h>
 #include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <variant>
 
 #include "mesh_files.h"
 #include "whole_file.h"
@@ -88,16 +88,16 @@ FloatGrid::Ptr rasterise(const std::vector<Sphere>& spheres, double growth, doub
 
 /// Depth (m) of the voxels inside a union of spheres below the union's surface, down to `reach`; infinite where not known.
 ///
-/// The value stored inside a union is the depth in the deepest sphere, which is less. But each voxel y in the void knows its exact
-/// distance F(y) to the union, so the ball of radius F(y) around it is void, and no x lies deeper than |x - y| - F(y). The least of
-/// these bounds is handed inwards from voxel to voxel, in the order of depth. It is off by a few hundredths of a voxel where the
-/// surface is smooth, and by a quarter of a voxel in the sharp grooves between two spheres.
+/// The value stored inside a union is the depth in the deepest sphere, which is less. But each voxel y in the void knows its
+/// exact distance F(y) to the union, so the ball of radius F(y) around it is void, and no x lies deeper than |x - y| - F(y). The
+/// least of these bounds is handed inwards from voxel to voxel, in the order of depth. It is off by a few hundredths of a voxel
+/// where the surface is smooth, and by a quarter of a voxel in the sharp grooves between two spheres.
 FloatTree depth_inside(const FloatGrid& grown, double voxel, double reach) {
   using openvdb::Coord;
-  constexpr float site_layer = 2.0f;  // sites are void voxels this near to the surface, and start what is this near to them
-  constexpr int start = 2;            // (both in voxels)
-  constexpr double gain = 1e-3;       // voxels; a smaller one is not handed on
-  constexpr double front_width = 0.5; // voxels
+  constexpr float site_layer = 2.0f;   // sites are void voxels this near to the surface, and start what is this near to them
+  constexpr int start = 2;             // (both in voxels)
+  constexpr double gain = 1e-3;        // voxels; a smaller one is not handed on
+  constexpr double front_width = 0.5;  // voxels
 
   struct Site {
     Coord at;
@@ -154,15 +154,16 @@ FloatGrid::Ptr shrink(const FloatGrid& grown, double closing, double voxel) {
   for (auto leaf = grown.tree().cbeginLeaf(); leaf; ++leaf) tree->touchLeaf(leaf->origin());
 
   tree::LeafManager<FloatTree> leaves(*tree);
-  leaves.foreach([&](FloatTree::LeafNodeType& leaf, std::size_t) {
+  leaves.foreach ([&](FloatTree::LeafNodeType& leaf, std::size_t) {
     tree::ValueAccessor<const FloatTree, /*IsSafe=*/false> union_at(grown.tree());
     for (Index n = 0; n < FloatTree::LeafNodeType::SIZE; ++n) {
       const float from_union = union_at.getValue(leaf.offsetToGlobalCoord(n));
       // Inside, no granule's own sphere may suffer from what the depth is off by.
-      const float value = from_union >= 0.0f ? from_union + back
-                                             : std::min(back - leaf.getValue(n), from_union + back);
-      if (std::abs(value) < width) leaf.setValueOn(n, value);
-      else leaf.setValueOff(n, value < 0.0f ? -width : width);
+      const float value = from_union >= 0.0f ? from_union + back : std::min(back - leaf.getValue(n), from_union + back);
+      if (std::abs(value) < width)
+        leaf.setValueOn(n, value);
+      else
+        leaf.setValueOff(n, value < 0.0f ? -width : width);
     }
   });
   tree->root().setBackground(width, /*updateChildNodes=*/false);
@@ -175,8 +176,7 @@ FloatGrid::Ptr shrink(const FloatGrid& grown, double closing, double voxel) {
 FloatGrid::Ptr ball(const Sphere& s, double voxel) {
   if (s.radius < nyquist_radius * voxel) return rasterise({s}, 0.0, voxel);
   const openvdb::Vec3f centre(openvdb::Vec3d(s.centre.x(), s.centre.y(), s.centre.z()));
-  return openvdb::tools::createLevelSetSphere<FloatGrid>(static_cast<float>(s.radius), centre,
-                                                         static_cast<float>(voxel), band);
+  return openvdb::tools::createLevelSetSphere<FloatGrid>(static_cast<float>(s.radius), centre, static_cast<float>(voxel), band);
 }
 
 /// Voxels of the body's frame seen from the world; OpenVDB's matrices act on row vectors.
@@ -213,7 +213,7 @@ struct InterfaceMesh::Impl {
   struct Box {
     Vec3 lo, hi;
   };
-  std::optional<Box> box;           // answers that cost a pass over the grid, kept until it changes
+  std::optional<Box> box;  // answers that cost a pass over the grid, kept until it changes
   std::optional<double> enclosed;
 
   Impl(double voxel_, double closing_) : voxel(voxel_), closing(closing_) {
@@ -235,9 +235,12 @@ struct InterfaceMesh::Impl {
   void apply() {
     // One after another and never two additions as one: what the mesh is may not depend on when it was asked for.
     for (Operation& op : queue) {
-      if (auto* addition = std::get_if<Addition>(&op)) unite(*additional_solid(*addition));
-      else if (auto* carved = std::get_if<Sphere>(&op)) subtract(*carved);
-      else unite(std::get<std::unique_ptr<Impl>>(op)->grid());
+      if (auto* addition = std::get_if<Addition>(&op))
+        unite(*additional_solid(*addition));
+      else if (auto* carved = std::get_if<Sphere>(&op))
+        subtract(*carved);
+      else
+        unite(std::get<std::unique_ptr<Impl>>(op)->grid());
     }
     queue.clear();
     queued_spheres = 0;
@@ -283,7 +286,8 @@ struct InterfaceMesh::Impl {
   const Box& bounding_box();
 };
 
-/// The box around the zero set of the trilinear field: each coordinate of that set is extreme on an edge between two voxel centres.
+/// The box around the zero set of the trilinear field: each coordinate of that set is extreme on an edge between two voxel
+/// centres.
 const InterfaceMesh::Impl::Box& InterfaceMesh::Impl::bounding_box() {
   const FloatTree& tree = grid().constTree();
   if (box) return *box;
@@ -346,7 +350,8 @@ void InterfaceMesh::merge(InterfaceMesh&& other) {
   other.impl_->pose = emptied->pose;
   if (emptied->pose != impl_->pose) {
     // seen from this frame: turn(here)^-1 turn(there), origins likewise
-    const Pose seen(impl_->pose.to_frame(emptied->pose.origin()), impl_->pose.quaternion().conjugate() * emptied->pose.quaternion());
+    const Pose seen(impl_->pose.to_frame(emptied->pose.origin()),
+                    impl_->pose.quaternion().conjugate() * emptied->pose.quaternion());
     const auto there = emptied->grid().copy();
     there->setTransform(transform(impl_->voxel, seen));
     auto here = std::make_unique<Impl>(impl_->voxel, impl_->closing);
@@ -395,9 +400,9 @@ void InterfaceMesh::bounds(Vec3& lo, Vec3& hi) const {
   hi = centre + half;
 }
 
-/// From the distances at the voxel centres. A voxel counts with its share on the inner side of a plane at that distance; the mix of
-/// two such ramps, one and two voxels wide, has no error of second order in voxel / radius of curvature. (The triangles have: they
-/// enclose 1 % less at a radius of ten voxels.)
+/// From the distances at the voxel centres. A voxel counts with its share on the inner side of a plane at that distance; the mix
+/// of two such ramps, one and two voxels wide, has no error of second order in voxel / radius of curvature. (The triangles have:
+/// they enclose 1 % less at a radius of ten voxels.)
 double InterfaceMesh::volume() const {
   const FloatTree& tree = impl_->grid().constTree();
   if (impl_->enclosed) return *impl_->enclosed;
@@ -457,7 +462,8 @@ InterfaceMesh InterfaceMesh::from_bytes(const std::string& bytes, double voxel, 
     if (grids && grids->size() == 1) grid = openvdb::gridPtrCast<FloatGrid>(grids->front());
     if (grid) {
       const openvdb::Vec3d o = grid->metaValue<openvdb::Vec3d>("pose_origin"), q = grid->metaValue<openvdb::Vec3d>("pose_turn");
-      mesh.impl_->pose = Pose(Vec3(o[0], o[1], o[2]), Eigen::Quaterniond(grid->metaValue<double>("pose_turn_w"), q[0], q[1], q[2]));
+      mesh.impl_->pose =
+          Pose(Vec3(o[0], o[1], o[2]), Eigen::Quaterniond(grid->metaValue<double>("pose_turn_w"), q[0], q[1], q[2]));
       for (const char* name : {"pose_origin", "pose_turn", "pose_turn_w"}) grid->removeMeta(name);
     }
   } catch (const std::exception& e) {
@@ -465,8 +471,8 @@ InterfaceMesh InterfaceMesh::from_bytes(const std::string& bytes, double voxel, 
   }
   if (!grid) throw std::runtime_error("InterfaceMesh: these bytes are no interface mesh");
   if (grid->transform() != mesh.impl_->stored->transform())
-    throw std::runtime_error("InterfaceMesh: these bytes hold a mesh with voxel " +
-                             std::to_string(grid->voxelSize()[0]) + ", not " + std::to_string(voxel));
+    throw std::runtime_error("InterfaceMesh: these bytes hold a mesh with voxel " + std::to_string(grid->voxelSize()[0]) +
+                             ", not " + std::to_string(voxel));
   mesh.impl_->stored = grid;
   return mesh;
 }
@@ -477,11 +483,10 @@ std::size_t InterfaceMesh::memory_bytes() const {
   return impl_->grid().memUsage() + impl_->queue.capacity() * sizeof(Impl::Operation);
 }
 
-void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>& meshes,
-               const std::vector<std::string>& names) {
+void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>& meshes, const std::vector<std::string>& names) {
   if (meshes.size() != names.size())
-    throw std::invalid_argument("write_vdb: " + std::to_string(names.size()) + " names for " +
-                                std::to_string(meshes.size()) + " meshes");
+    throw std::invalid_argument("write_vdb: " + std::to_string(names.size()) + " names for " + std::to_string(meshes.size()) +
+                                " meshes");
   start_openvdb();
   WholeFile out(file);
   out.close();  // OpenVDB opens the file by its name; that this is possible is known now, or the reason why not

@@ -1,13 +1,12 @@
 #include "mesh_files.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
-
-#include <Eigen/Geometry>
 
 #include "whole_file.h"
 
@@ -27,9 +26,7 @@ WholeFile::~WholeFile() {
   if (!committed_) std::remove(part_.c_str());
 }
 
-void WholeFile::fail(const std::string& reason) const {
-  throw std::runtime_error("cannot write " + file_ + ": " + reason);
-}
+void WholeFile::fail(const std::string& reason) const { throw std::runtime_error("cannot write " + file_ + ": " + reason); }
 
 void WholeFile::write(const void* data, std::size_t bytes) {
   if (bytes > 0 && std::fwrite(data, 1, bytes, stream_) != bytes) fail(std::strerror(errno));
@@ -101,15 +98,25 @@ class Base64 {
   int filled_ = 0;
 };
 
-template <class T> constexpr const char* vtk_type();
-template <> constexpr const char* vtk_type<float>() { return "Float32"; }
-template <> constexpr const char* vtk_type<int>() { return "Int32"; }
-template <> constexpr const char* vtk_type<std::int64_t>() { return "Int64"; }
+template <class T>
+constexpr const char* vtk_type();
+template <>
+constexpr const char* vtk_type<float>() {
+  return "Float32";
+}
+template <>
+constexpr const char* vtk_type<int>() {
+  return "Int32";
+}
+template <>
+constexpr const char* vtk_type<std::int64_t>() {
+  return "Int64";
+}
 
 template <class T>
 void write_array(WholeFile& file, const std::string& name, const std::vector<T>& values, int components = 1) {
-  file.write(std::string("        <DataArray type=\"") + vtk_type<T>() + "\" Name=\"" + name +
-             "\" NumberOfComponents=\"" + std::to_string(components) + "\" format=\"binary\">");
+  file.write(std::string("        <DataArray type=\"") + vtk_type<T>() + "\" Name=\"" + name + "\" NumberOfComponents=\"" +
+             std::to_string(components) + "\" format=\"binary\">");
   Base64 encoded(file);
   const std::uint64_t bytes = values.size() * sizeof(T);
   encoded.put(&bytes, sizeof bytes);
@@ -119,11 +126,12 @@ void write_array(WholeFile& file, const std::string& name, const std::vector<T>&
 }
 
 void begin_poly_data(WholeFile& file, std::size_t points, std::size_t verts, std::size_t polys) {
-  file.write("<?xml version=\"1.0\"?>\n"
-             "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
-             "  <PolyData>\n    <Piece NumberOfPoints=\"" + std::to_string(points) +
-             "\" NumberOfVerts=\"" + std::to_string(verts) +
-             "\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" + std::to_string(polys) + "\">\n");
+  file.write(
+      "<?xml version=\"1.0\"?>\n"
+      "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
+      "  <PolyData>\n    <Piece NumberOfPoints=\"" +
+      std::to_string(points) + "\" NumberOfVerts=\"" + std::to_string(verts) +
+      "\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" + std::to_string(polys) + "\">\n");
 }
 
 void end_poly_data(WholeFile& file) { file.write("    </Piece>\n  </PolyData>\n</VTKFile>\n"); }

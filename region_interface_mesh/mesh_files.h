@@ -15,16 +15,15 @@ void write_stl(const std::string& file, const TriangleMesh& mesh);
 void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<int>& body_of_triangle);
 
 /// OpenVDB file with one level-set grid per mesh, named by `names`. Local.
-void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>& meshes,
-               const std::vector<std::string>& names);
+void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>& meshes, const std::vector<std::string>& names);
 
 /// State of a granule in a bed file; the numbers stand in the file.
 enum class GranuleState : int { exterior = 0, interface_ = 1, interior = 2, waking = 3 };
 
 /// All granules of a bed, stored ones too, as columns of equal length (SI units, world frame).
 struct BedTable {
-  std::vector<float> position;      // 3 per granule
-  std::vector<float> velocity;      // 3 per granule
+  std::vector<float> position;  // 3 per granule
+  std::vector<float> velocity;  // 3 per granule
   std::vector<float> radius;
   std::vector<int> tag, type, state, body;
 };

@@ -27,7 +27,8 @@ void RegInterfaceMesh::shape_update() {
   const int f = modify->find_fix(fix_.c_str());
   auto* source = f >= 0 ? dynamic_cast<InterfaceMeshSource*>(modify->fix[f]) : nullptr;
   if (!source) {
-    const std::string line = "region interface/mesh: '" + fix_ + "' is no fix solid/cull: define the fix before the region, and " +
+    const std::string line = "region interface/mesh: '" + fix_ +
+                             "' is no fix solid/cull: define the fix before the region, and " +
                              "delete the region before the fix";
     error->all(FLERR, line.c_str());
   }

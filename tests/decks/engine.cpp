@@ -175,7 +175,8 @@ std::string body(const Bed& bed) {
        "fix m8 all property/global coefficientRollingViscousDamping peratomtypepair 2 0.1 0.1 0.1 0.1\n"
        "fix m6 all property/global characteristicVelocity scalar 1.0\n";
   if (bed.cohesion) s << "fix m7 all property/global cohesionEnergyDensity peratomtypepair 2 3000 3000 3000 3000\n";
-  s << "pair_style gran " << bed.contact << "\npair_coeff * *\ntimestep " << bed.dt << "\nfix grav all gravity 9.81 vector 0 0 -1\n";
+  s << "pair_style gran " << bed.contact << "\npair_coeff * *\ntimestep " << bed.dt
+    << "\nfix grav all gravity 9.81 vector 0 0 -1\n";
   const std::string wall = " all wall/gran " + bed.contact;
   for (const char* dim : {"x", "y"}) {
     if (bed.periodic) break;
@@ -195,7 +196,8 @@ std::string body(const Bed& bed) {
 std::string pouring(const Bed& bed) {
   std::ostringstream s;
   const double rim = bed.periodic ? 0 : 0.002;
-  s << head(bed) << "region reg block " << -rim << ' ' << bed.side + rim << ' ' << -rim << ' ' << bed.side + rim << " -0.002 0.15\n"
+  s << head(bed) << "region reg block " << -rim << ' ' << bed.side + rim << ' ' << -rim << ' ' << bed.side + rim
+    << " -0.002 0.15\n"
     << "create_box 2 reg\nneighbor 0.0006 bin\nneigh_modify delay 0\n"
     << body(bed)
     << "fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0012\n"
@@ -224,8 +226,7 @@ std::string settled(const Bed& bed) {
     << "fix visc all viscous 0.002\nrun " << steps(6000) << "\n";
   // spin about a lone contact has no damping in most models: stopped by hand, until the bed is at rest
   for (int k = 0; k < 8; ++k) s << "set group all omegax 0 omegay 0 omegaz 0\nvelocity all set 0 0 0\nrun " << steps(700) << "\n";
-  s << "unfix visc\nwrite_restart "
-    << file << "\n";
+  s << "unfix visc\nwrite_restart " << file << "\n";
   e.run(s.str());
   made.insert(bed.name);
   return file;

@@ -11,7 +11,7 @@
 namespace LAMMPS_NS {
 class Fix;
 class LAMMPS;
-}
+}  // namespace LAMMPS_NS
 
 namespace decks {
 
@@ -36,7 +36,7 @@ class Engine {
 
   void run(const std::string& deck);  ///< lines of a deck
   State state() const;
-  Histories histories();              ///< granule-granule and granule-mesh
+  Histories histories();                         ///< granule-granule and granule-mesh
   double vector(const std::string& fix, int n);  ///< f_ID[n], n from 1; n = 0: f_ID
   double variable(const std::string& name);      ///< an equal-style variable
   int group_bit(const std::string& name) const;
@@ -59,14 +59,14 @@ struct Bed {
   bool cohesion = false;
   bool periodic = false;  // in x and y, instead of side walls
   int granules = 1300;
-  double side = 0.026;    // m, square base
-  double dt = 3e-5;       // s
-  std::string extra;      // lines after the walls
+  double side = 0.026;  // m, square base
+  double dt = 3e-5;     // s
+  std::string extra;    // lines after the walls
 };
 
-std::string head(const Bed& bed);                         ///< up to the box
-std::string body(const Bed& bed);                         ///< material, walls, gravity
-std::string read_bed(const Bed& bed);                     ///< reads the settled bed (made once, see settled())
+std::string head(const Bed& bed);      ///< up to the box
+std::string body(const Bed& bed);      ///< material, walls, gravity
+std::string read_bed(const Bed& bed);  ///< reads the settled bed (made once, see settled())
 /// A deck up to the first run of a pour into an empty box.
 std::string pouring(const Bed& bed);
 /// Pours and settles the bed once for all tests of a process and returns the restart file's name. Collective.

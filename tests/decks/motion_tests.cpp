@@ -14,28 +14,33 @@
 namespace decks {
 namespace {
 
+using Eigen::Vector3d;
 using solidcull::RigidMotion;
 using solidcull::RigidPart;
-using Eigen::Vector3d;
 
 constexpr double diameter = 0.0026, dt = 3e-5;
 
 Vector3d eigen(const Vec& v) { return Vector3d(v[0], v[1], v[2]); }
 
-/// A block of 8 x 6 x 5 granules that stick together, pushed out of order and at rest again: no gravity, no walls. more: lines that
-/// make further granules (LIGGGHTS loses contact histories between ranks when atoms are created later).
+/// A block of 8 x 6 x 5 granules that stick together, pushed out of order and at rest again: no gravity, no walls. more: lines
+/// that make further granules (LIGGGHTS loses contact histories between ranks when atoms are created later).
 std::string sticky_block(const std::string& more = "") {
   Bed bed;
   bed.contact = "model hertz tangential history cohesion sjkr rolling_friction epsd2";
   bed.cohesion = true;
-  return head(bed) + "region box block 0 0.08 0 0.08 0 0.08 units box\ncreate_box 2 box\nneighbor 0.0004 bin\nneigh_modify delay 0\n" +
+  return head(bed) +
+         "region box block 0 0.08 0 0.08 0 0.08 units box\ncreate_box 2 box\nneighbor 0.0004 bin\nneigh_modify delay 0\n" +
          body(bed) +
          "unfix m7\nfix m7 all property/global cohesionEnergyDensity peratomtypepair 2 100000 100000 100000 100000\n"
          "unfix grav\nunfix x1\nunfix x2\nunfix y1\nunfix y2\nunfix z1\n"
-         "lattice sc 0.00258\nregion lattice block 0.0299 0.0495 0.0299 0.0442 0.0299 0.0417 units box\ncreate_atoms 1 region lattice\n" +
-         more + "set group all diameter 0.0026\nset group all density 2500\nfix integr all nve/sphere\nthermo 100000\nthermo_modify norm no\n"
+         "lattice sc 0.00258\nregion lattice block 0.0299 0.0495 0.0299 0.0442 0.0299 0.0417 units box\ncreate_atoms 1 region "
+         "lattice\n" +
+         more +
+         "set group all diameter 0.0026\nset group all density 2500\nfix integr all nve/sphere\nthermo 100000\nthermo_modify "
+         "norm no\n"
          "run 0\ndisplace_atoms all random 3e-6 3e-6 3e-6 49979687 units box\n"
-         "fix visc all viscous 0.002\nrun 20000\nunfix visc\nvelocity all set 0 0 0\nset group all omegax 0 omegay 0 omegaz 0\nrun 0\n";
+         "fix visc all viscous 0.002\nrun 20000\nunfix visc\nvelocity all set 0 0 0\nset group all omegax 0 omegay 0 omegaz "
+         "0\nrun 0\n";
 }
 
 /// Gives every granule the velocity field of a rigid body.
@@ -104,12 +109,13 @@ Eigen::Matrix3d rotation_between(const State& from, const State& to, double* res
   return r;
 }
 
-/// Free flight of the same mass by Runge and Kutta's rule of fourth order on the rotation matrix, in steps a tenth as long: right to
-/// 1e-12 here.
+/// Free flight of the same mass by Runge and Kutta's rule of fourth order on the rotation matrix, in steps a tenth as long: right
+/// to 1e-12 here.
 Eigen::Matrix3d flight(const State& s, double seconds) {
   std::vector<RigidPart> parts;
   for (const auto& g : s)
-    parts.push_back(RigidPart::granule(g.second.mass, g.second.radius, eigen(g.second.x), eigen(g.second.v), eigen(g.second.omega)));
+    parts.push_back(
+        RigidPart::granule(g.second.mass, g.second.radius, eigen(g.second.x), eigen(g.second.v), eigen(g.second.omega)));
   Vector3d centre = Vector3d::Zero();
   double mass = 0;
   for (const RigidPart& p : parts) {
@@ -176,9 +182,10 @@ TEST(Motion, FreeFlightKeepsMomentumAndTurnsAsARigidBodyDoes) {
   EXPECT_LE(off, 1e-6);
   EXPECT_LE(residual, 1e-10 * diameter);
   if (e.rank() == 0)
-    std::printf("10,000 steps, %.3g rad: momentum constant to %.2g, angular momentum to %.2g, orientation off the free top's by %.2g, "
-                "places off a rigid motion by %.2g d\n",
-                std::acos(0.5 * (turned.trace() - 1)), worst[0], worst[1], off, residual / diameter);
+    std::printf(
+        "10,000 steps, %.3g rad: momentum constant to %.2g, angular momentum to %.2g, orientation off the free top's by %.2g, "
+        "places off a rigid motion by %.2g d\n",
+        std::acos(0.5 * (turned.trace() - 1)), worst[0], worst[1], off, residual / diameter);
 }
 
 TEST(Motion, FreeFlightIsThatOfTheUnculledMass) {
@@ -211,8 +218,8 @@ TEST(Motion, FreeFlightIsThatOfTheUnculledMass) {
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   if (rank == 0)
-    std::printf("%.3g rad, culled against unculled: momentum %.2g, angular momentum %.2g, places %.2g of the way\n", angle, momentum, turning,
-                apart / way);
+    std::printf("%.3g rad, culled against unculled: momentum %.2g, angular momentum %.2g, places %.2g of the way\n", angle,
+                momentum, turning, apart / way);
 }
 
 TEST(Motion, RestoreAfterARigidMotionIsTheSamePackingTurned) {
@@ -259,18 +266,24 @@ TEST(Motion, RestoreAfterARigidMotionIsTheSamePackingTurned) {
   for (const auto& g : before) off = std::max(off, (r * eigen(g.second.f) - eigen(after.at(g.first).f)).norm());
   const double contact_force = 100 * before.begin()->second.mass * 9.81;
   if (e.rank() == 0)
-    std::printf("turned by %.3g rad: places off a rigid motion by %.2g d, shear histories by %.2g, rolling ones by %.2g, net forces by %.2g "
-                "of 100 weights\n", angle, residual / diameter, history_off[0] / scale[0], history_off[1] / scale[1], off / contact_force);
+    std::printf(
+        "turned by %.3g rad: places off a rigid motion by %.2g d, shear histories by %.2g, rolling ones by %.2g, net forces by "
+        "%.2g "
+        "of 100 weights\n",
+        angle, residual / diameter, history_off[0] / scale[0], history_off[1] / scale[1], off / contact_force);
   EXPECT_LE(off, 1e-2 * contact_force);
 }
 
 TEST(Motion, LedgerInFlight) {
   // a spinning mass is struck by three fast granules: parts are carved out, may come off, and are culled again
   Engine e;
-  e.run(sticky_block("create_atoms 1 single 0.041 0.038 0.055 units box\ncreate_atoms 1 single 0.02 0.037 0.036 units box\n"
-                     "create_atoms 1 single 0.038 0.055 0.037 units box\n"));
+  e.run(
+      sticky_block("create_atoms 1 single 0.041 0.038 0.055 units box\ncreate_atoms 1 single 0.02 0.037 0.036 units box\n"
+                   "create_atoms 1 single 0.038 0.055 0.037 units box\n"));
   throw_spinning(e, Vector3d(0.01, 0.01, 0.02), Vector3d(2, 3, -1));
-  e.run("group s1 id 241\ngroup s2 id 242\ngroup s3 id 243\nvelocity s1 set 0 0 -0.8\nvelocity s2 set 0.6 0 0\nvelocity s3 set 0 -0.5 0\nrun 0\n");
+  e.run(
+      "group s1 id 241\ngroup s2 id 242\ngroup s3 id 243\nvelocity s1 set 0 0 -0.8\nvelocity s2 set 0.6 0 0\nvelocity s3 set 0 "
+      "-0.5 0\nrun 0\n");
   const Ledger before = ledger(e, false);
   double momenta = 0, turnings = 0;  // scales: sums of magnitudes
   for (const auto& g : e.state()) {
@@ -304,7 +317,8 @@ TEST(Motion, AMassFallsOnTheFloorAndNothingGoesThrough) {
   Bed bed;
   bed.name = "fall";
   Engine e;
-  e.run(read_bed(bed) + "run 0\nunfix grav\nfix visc all viscous 0.002\nrun 6000\nunfix visc\nvelocity all set 0 0 0\n"
+  e.run(read_bed(bed) +
+        "run 0\nunfix grav\nfix visc all viscous 0.002\nrun 6000\nunfix visc\nvelocity all set 0 0 0\n"
         "set group all omegax 0 omegay 0 omegaz 0\ndisplace_atoms all move 0 0 0.03 units box\n"
         "fix cull all solid/cull every 50 calm 2 depth 1.5\nrun 300\n");
   EXPECT_GT(e.vector("cull", 3), 200) << "it hangs in the air as one mass";

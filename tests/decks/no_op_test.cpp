@@ -95,7 +95,8 @@ INSTANTIATE_TEST_SUITE_P(
                     bed("hooke_history_epsd_mesh", "model hooke tangential history rolling_friction epsd", true),
                     bed("hooke_plain_mesh", "model hooke tangential no_history", true),
                     bed("hertz_sjkr", "model hertz tangential history cohesion sjkr", false, true),
-                    bed("hertz_sjkr_mesh", "model hertz tangential history cohesion sjkr rolling_friction epsd2", true, true), periodic()),
+                    bed("hertz_sjkr_mesh", "model hertz tangential history cohesion sjkr rolling_friction epsd2", true, true),
+                    periodic()),
     [](const testing::TestParamInfo<Bed>& info) { return info.param.name; });
 
 }  // namespace

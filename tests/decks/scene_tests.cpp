@@ -82,9 +82,10 @@ TEST(Scenes, FinesPouredOnACoarseBedNeverTouchAnInteriorGranule) {
   const double before = f(e, 3);
   ASSERT_GT(before, 30);
   // 10:1: granules of 0.13 mm radius fall through the pores (type 2's material, stiff enough for 1e-6 s)
-  std::string pour = "lattice sc 0.0006\nregion fines block 0.009 0.017 0.009 0.017 0.040 0.046 units box\n"
-                     "create_atoms 2 region fines\ngroup fines id > 700\nset group fines diameter 0.00026\n"
-                     "set group fines density 2500\nvelocity fines set 0 0 -1.0\ntimestep 0.000003\n";
+  std::string pour =
+      "lattice sc 0.0006\nregion fines block 0.009 0.017 0.009 0.017 0.040 0.046 units box\n"
+      "create_atoms 2 region fines\ngroup fines id > 700\nset group fines diameter 0.00026\n"
+      "set group fines density 2500\nvelocity fines set 0 0 -1.0\ntimestep 0.000003\n";
   e.run(pour);
   const std::size_t fines = e.state().size() + static_cast<std::size_t>(before) - 700;
   ASSERT_GT(fines, 500u);
@@ -133,7 +134,8 @@ double load_change_at_wake_up(double plate_speed) {
   MPI_Barrier(MPI_COMM_WORLD);
   e.run(bed.extra + "fix down all move/mesh mesh plate linear 0 0 -0.02\nfix visc all viscous 0.002\nrun 0\n");
   while (e.vector("plate", 3) < 0.2) e.run("run 20 pre no post no\n");
-  e.run("unfix down\nrun 4000\nunfix visc\nrun 1000\nfix cull all solid/cull every 50 calm 2 depth 1.5 tolerance 1 0\nrun 1000\n");
+  e.run(
+      "unfix down\nrun 4000\nunfix visc\nrun 1000\nfix cull all solid/cull every 50 calm 2 depth 1.5 tolerance 1 0\nrun 1000\n");
   EXPECT_GT(f(e, 3), 100);
   EXPECT_EQ(f(e, 8), 0);
   const double before = e.vector("plate", 3);
@@ -141,7 +143,7 @@ double load_change_at_wake_up(double plate_speed) {
   std::snprintf(move, sizeof move, "fix down all move/mesh mesh plate linear 0 0 -%g\nrun 0\n", plate_speed);
   e.run(move);
   const int chunk = std::max(1, static_cast<int>(1e-9 / plate_speed / bed.dt));  // a nanometre
-  double load = 0;  // what wakes moves, so the load is read before
+  double load = 0;                                                               // what wakes moves, so the load is read before
   for (int k = 0; k < 2000; ++k) {
     e.run("run " + std::to_string(chunk) + " pre no post no\n");
     if (f(e, 8) > 0 || f(e, 9) > 1) return load;
@@ -161,7 +163,9 @@ TEST(Scenes, ASlowAndAFastRampWakeAtTheSameLoad) {
   if (rank == 0) std::printf("first wake-up at +%.5g N (10 x slower: +%.5g N, 10 x faster: +%.5g N)\n", middle, slow, fast);
 }
 
-double distance(const Vec& a, const Vec& b) { return std::sqrt(std::pow(a[0] - b[0], 2) + std::pow(a[1] - b[1], 2) + std::pow(a[2] - b[2], 2)); }
+double distance(const Vec& a, const Vec& b) {
+  return std::sqrt(std::pow(a[0] - b[0], 2) + std::pow(a[1] - b[1], 2) + std::pow(a[2] - b[2], 2));
+}
 
 TEST(Scenes, ABlowOfGivenExcessCarvesTheBallsOfTheLaw) {
   Bed bed;
@@ -228,9 +232,11 @@ TEST(Scenes, ABlowOfGivenExcessCarvesTheBallsOfTheLaw) {
 TEST(Scenes, TheRegionHoldsTheBodiesAndNothingElse) {
   const Bed bed = mesh_bed("region");
   Engine e;
-  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.5\nrun 500\nrun 0\nregion solid interface/mesh cull\n"
+  e.run(read_bed(bed) +
+        "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.5\nrun 500\nrun 0\nregion solid interface/mesh cull\n"
         "region rest interface/mesh cull side out\ngroup held region solid\nvariable held equal count(held)\n"
-        "variable both equal count(all,solid)+count(all,rest)\nvariable one atom 1\ncompute inside all reduce/region solid sum v_one\n"
+        "variable both equal count(all,solid)+count(all,rest)\nvariable one atom 1\ncompute inside all reduce/region solid sum "
+        "v_one\n"
         "variable inside equal c_inside\nthermo_style custom step atoms c_inside\nrun 0\n");
   EXPECT_EQ(e.variable("both"), f(e, 1) + f(e, 2));
   EXPECT_EQ(e.variable("held"), e.variable("inside"));
@@ -284,7 +290,8 @@ TEST(Scenes, GranulesLeaveByTheStoreAndComeBackWithTheirIds) {
   const State atoms = e.state();
   EXPECT_TRUE(atoms.count(1300)) << "the highest tag must stay an atom: new atoms are numbered from it";
   ASSERT_GT(f(e, 3), 100);
-  e.run("create_atoms 1 single 0.013 0.013 0.06\ngroup new id > 1300\nset group new diameter 0.0026\nset group new density 2500\n");
+  e.run(
+      "create_atoms 1 single 0.013 0.013 0.06\ngroup new id > 1300\nset group new diameter 0.0026\nset group new density 2500\n");
   EXPECT_TRUE(e.state().count(1301));
   e.run("unfix cull\nrun 0\n");
   EXPECT_EQ(e.state().size(), 1301u);

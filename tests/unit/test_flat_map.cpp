@@ -1,10 +1,10 @@
-#include "flat_map.h"
+#include <gtest/gtest.h>
 
 #include <random>
 #include <string>
 #include <unordered_map>
 
-#include <gtest/gtest.h>
+#include "flat_map.h"
 
 namespace solidcull {
 namespace {

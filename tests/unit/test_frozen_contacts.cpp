@@ -1,13 +1,13 @@
-#include "frozen_contacts.h"
+#include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <map>
 #include <random>
 #include <set>
 #include <stdexcept>
 
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
+#include "frozen_contacts.h"
 
 namespace solidcull {
 namespace {
@@ -210,8 +210,7 @@ TEST(FrozenContacts, a_body_that_turns_turns_each_of_its_contacts_once) {
   }
   contacts.erase(3);  // leaves free places behind
   for (auto d = due.begin(); d != due.end();) d = d->first.first == 3 || d->first.second == 3 ? due.erase(d) : std::next(d);
-  for (std::int64_t tag = 0; tag < 10; ++tag)
-    contacts.turn(tag, by, [&](std::int64_t partner) { return partner > tag; });
+  for (std::int64_t tag = 0; tag < 10; ++tag) contacts.turn(tag, by, [&](std::int64_t partner) { return partner > tag; });
   int turned = 0, kept = 0;
   for (auto& [pair, h] : due) {
     if (pair.first < 10 && !h.empty()) {

@@ -1,4 +1,4 @@
-#include "granule_store.h"
+#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include <set>
 #include <stdexcept>
 
-#include <gtest/gtest.h>
+#include "granule_store.h"
 
 namespace solidcull {
 namespace {
@@ -360,7 +360,8 @@ TEST(GranuleStore, a_query_of_one_body_does_not_see_another) {
     Tags tags;
     store.for_each_near(body, {Vec3::Zero(), 0.002}, 0.0, [&](const StoredGranule& s) { tags.insert(s.tag); });
     Tags in_box;
-    store.for_each_in_box(body, Vec3::Constant(-0.01), Vec3::Constant(0.01), [&](const StoredGranule& s) { in_box.insert(s.tag); });
+    store.for_each_in_box(body, Vec3::Constant(-0.01), Vec3::Constant(0.01),
+                          [&](const StoredGranule& s) { in_box.insert(s.tag); });
     EXPECT_EQ(tags, in_box);
     return tags;
   };
@@ -432,8 +433,10 @@ TEST(GranuleStore, knows_its_bodies_while_granules_come_go_move_and_merge) {
     for (int n = 0; n < 40; ++n) frames.add(next++, any_body());
     std::vector<std::int64_t> leaving, moving;
     for (const auto& g : frames.granules) {
-      if (frames.random() % 4 == 0) leaving.push_back(g.first);
-      else if (frames.random() % 4 == 0) moving.push_back(g.first);
+      if (frames.random() % 4 == 0)
+        leaving.push_back(g.first);
+      else if (frames.random() % 4 == 0)
+        moving.push_back(g.first);
     }
     for (const std::int64_t tag : leaving) frames.take(tag);
     for (const std::int64_t tag : moving) frames.move(tag, any_body());

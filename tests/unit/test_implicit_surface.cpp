@@ -1,4 +1,4 @@
-#include "implicit_surface.h"
+#include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
@@ -6,12 +6,12 @@
 #include <stdexcept>
 #include <tuple>
 
-#include <gtest/gtest.h>
+#include "implicit_surface.h"
 
 namespace solidcull {
 namespace {
 
-constexpr double voxel = 1e-3;  // m
+constexpr double voxel = 1e-3;                   // m
 const double diagonal = std::sqrt(3.0) * voxel;  // the void voxel nearest to a point may lie this much behind the nearest void
 
 /// Spheres that a test may change while a surface looks at them.

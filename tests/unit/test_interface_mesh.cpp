@@ -1,4 +1,4 @@
-#include "interface_mesh.h"
+#include <gtest/gtest.h>
 
 #include <cmath>
 #include <map>
@@ -6,7 +6,7 @@
 #include <random>
 #include <stdexcept>
 
-#include <gtest/gtest.h>
+#include "interface_mesh.h"
 
 namespace solidcull {
 namespace {
@@ -19,8 +19,7 @@ double ball_volume(double radius) { return 4.0 / 3.0 * pi * radius * radius * ra
 /// Volume that two balls at this distance have in common.
 double lens_volume(double a, double b, double distance) {
   const double overlap = a + b - distance;
-  return pi * overlap * overlap *
-         (distance * distance + 2 * distance * (a + b) - 3 * (a - b) * (a - b)) / (12 * distance);
+  return pi * overlap * overlap * (distance * distance + 2 * distance * (a + b) - 3 * (a - b) * (a - b)) / (12 * distance);
 }
 
 struct Topology {
@@ -49,8 +48,8 @@ Topology topology_of(const TriangleMesh& mesh) {
     const auto twin = half_edges.find({edge.second, edge.first});
     if (times != 1 || twin == half_edges.end()) topology.closed = false;
   }
-  topology.euler = static_cast<int>(mesh.vertices.size()) - static_cast<int>(half_edges.size() / 2) +
-                   static_cast<int>(mesh.triangles.size());
+  topology.euler =
+      static_cast<int>(mesh.vertices.size()) - static_cast<int>(half_edges.size() / 2) + static_cast<int>(mesh.triangles.size());
   return topology;
 }
 
@@ -171,8 +170,8 @@ TEST(InterfaceMesh, a_carve_that_swallows_the_body_empties_it) {
 TEST(InterfaceMesh, carves_equal_their_union_whatever_their_order) {
   const Sphere body{Vec3::Zero(), 20.0 * voxel};
   const std::vector<std::vector<Sphere>> cases = {
-      {{Vec3(8, 0, 0) * voxel, 9 * voxel}, {Vec3(9, 1, 0) * voxel, 4 * voxel}},    // nested
-      {{Vec3(-7, 0, 0) * voxel, 6 * voxel}, {Vec3(5, 0, 0) * voxel, 6 * voxel}},   // touching
+      {{Vec3(8, 0, 0) * voxel, 9 * voxel}, {Vec3(9, 1, 0) * voxel, 4 * voxel}},   // nested
+      {{Vec3(-7, 0, 0) * voxel, 6 * voxel}, {Vec3(5, 0, 0) * voxel, 6 * voxel}},  // touching
       {{Vec3(-4, 0, 3) * voxel, 7 * voxel}, {Vec3(4, 2, 0) * voxel, 8 * voxel}, {Vec3(0, 15, 0) * voxel, 9 * voxel}}};
   for (const auto& carves : cases) {
     InterfaceMesh forward(voxel, 0.0), backward(voxel, 0.0), in_steps(voxel, 0.0);

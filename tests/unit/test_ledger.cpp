@@ -1,8 +1,8 @@
-#include "ledger.h"
+#include <gtest/gtest.h>
 
 #include <random>
 
-#include <gtest/gtest.h>
+#include "ledger.h"
 
 namespace solidcull {
 namespace {

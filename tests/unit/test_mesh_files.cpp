@@ -1,4 +1,5 @@
-#include "mesh_files.h"
+#include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstring>
 #include <filesystem>
@@ -6,8 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include <gtest/gtest.h>
-#include <unistd.h>
+#include "mesh_files.h"
 
 namespace solidcull {
 namespace {
@@ -114,9 +114,9 @@ TEST_F(MeshFiles, stl_holds_the_triangles) {
   ASSERT_EQ(bytes.size(), 84u + 50u * mesh.triangles.size());
   EXPECT_NE(bytes.substr(0, 5), "solid ") << "readers would take it for an ASCII file";
   EXPECT_EQ(number_at<std::uint32_t>(bytes, 80), 4u);
-  EXPECT_EQ(number_at<float>(bytes, 84 + 8), -1.0f);               // first normal points down
-  EXPECT_EQ(number_at<float>(bytes, 84 + 50 + 12 + 12), 1.0f);     // second triangle, second corner, x
-  EXPECT_EQ(number_at<float>(bytes, 84 + 3 * 50 + 12 + 32), 0.5f); // last triangle, last corner, z
+  EXPECT_EQ(number_at<float>(bytes, 84 + 8), -1.0f);                // first normal points down
+  EXPECT_EQ(number_at<float>(bytes, 84 + 50 + 12 + 12), 1.0f);      // second triangle, second corner, x
+  EXPECT_EQ(number_at<float>(bytes, 84 + 3 * 50 + 12 + 32), 0.5f);  // last triangle, last corner, z
   EXPECT_TRUE(nothing_left_over());
 }
 
@@ -189,11 +189,10 @@ TEST_F(MeshFiles, say_why_they_cannot_be_written_and_leave_nothing) {
     std::string name;
     std::function<void(const std::string&)> write;
   };
-  const std::vector<Case> cases = {
-      {"stl", [](const std::string& f) { write_stl(f, tetrahedron()); }},
-      {"vtp", [](const std::string& f) { write_vtp(f, tetrahedron(), {}); }},
-      {"bed", [](const std::string& f) { write_bed_vtp(f, bed_of(5)); }},
-      {"vdb", [&](const std::string& f) { write_vdb(f, {&mesh}, {"body"}); }}};
+  const std::vector<Case> cases = {{"stl", [](const std::string& f) { write_stl(f, tetrahedron()); }},
+                                   {"vtp", [](const std::string& f) { write_vtp(f, tetrahedron(), {}); }},
+                                   {"bed", [](const std::string& f) { write_bed_vtp(f, bed_of(5)); }},
+                                   {"vdb", [&](const std::string& f) { write_vdb(f, {&mesh}, {"body"}); }}};
   fs::create_directory(path("taken"));
   std::ofstream(path("taken") + "/keeps it from being replaced") << "x";
   for (const Case& c : cases) {

@@ -1,5 +1,9 @@
 // Where bodies are, and interface meshes that ride along with them.
-#include "pose.h"
+#include <gtest/gtest.h>
+#include <openvdb/io/Stream.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Interpolation.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
@@ -9,14 +13,9 @@
 #include <random>
 #include <sstream>
 
-#include <gtest/gtest.h>
-#include <openvdb/io/Stream.h>
-#include <openvdb/openvdb.h>
-#include <openvdb/tools/Interpolation.h>
-#include <unistd.h>
-
 #include "interface_mesh.h"
 #include "mesh_files.h"
+#include "pose.h"
 
 namespace solidcull {
 namespace {
@@ -309,7 +308,8 @@ void expect_same_solid(const InterfaceMesh& is, const InterfaceMesh& due, const 
     const double distance = due.signed_distance(x);
     if (std::abs(distance) < voxel) continue;
     (distance < 0 ? inside : outside) += 1;
-    ASSERT_EQ(is.inside(x), distance < 0) << "at " << pose.to_frame(x).transpose() / voxel << " voxels, distance " << distance / voxel;
+    ASSERT_EQ(is.inside(x), distance < 0) << "at " << pose.to_frame(x).transpose() / voxel << " voxels, distance "
+                                          << distance / voxel;
   }
   EXPECT_GT(inside, 100);
   EXPECT_GT(outside, 100);

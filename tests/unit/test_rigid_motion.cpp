@@ -1,4 +1,4 @@
-#include "rigid_motion.h"
+#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <boost/math/quadrature/gauss.hpp>
@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include <gtest/gtest.h>
+#include "rigid_motion.h"
 
 namespace solidcull {
 namespace {
@@ -51,7 +51,8 @@ class Random {
   std::mt19937 engine_;
 };
 
-/// Momentum, angular momentum about the world's origin, and the sums of their sizes: what is kept, and against what it is measured.
+/// Momentum, angular momentum about the world's origin, and the sums of their sizes: what is kept, and against what it is
+/// measured.
 struct Momenta {
   Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
   double linear_sizes = 0, angular_sizes = 0, energy = 0;
@@ -156,8 +157,9 @@ TEST(RigidMotion, free_flight_keeps_momentum_and_angular_momentum) {
     }
     EXPECT_GT(motion.spin().norm(), 1.0) << "a body that does not turn shows nothing";
   }
-  std::printf("10000 steps of free flight: momentum %.1e, angular momentum %.1e, energy %.1e, place of the centre %.1e (relative)\n",
-              worst_linear, worst_angular, worst_energy, worst_place);
+  std::printf(
+      "10000 steps of free flight: momentum %.1e, angular momentum %.1e, energy %.1e, place of the centre %.1e (relative)\n",
+      worst_linear, worst_angular, worst_energy, worst_place);
   EXPECT_LE(worst_linear, 1e-10);
   EXPECT_LE(worst_angular, 1e-10);
   EXPECT_LE(worst_energy, 1e-6);  // the midpoint rule keeps it to second order
@@ -195,15 +197,16 @@ TEST(RigidMotion, a_symmetric_top_precesses_as_the_formula_says) {
   EXPECT_LE(worst, 1e-6);
 }
 
-/// Euler's top with I1 < I2 < I3 and L^2 > 2 E I2 (Landau and Lifshitz, Mechanics, section 37). L is along z in the formula's frame,
-/// and `frame` turns that into the world's.
+/// Euler's top with I1 < I2 < I3 and L^2 > 2 E I2 (Landau and Lifshitz, Mechanics, section 37). L is along z in the formula's
+/// frame, and `frame` turns that into the world's.
 struct TriaxialTop {
   Vec3 inertia;
   double energy, angular;
   Matrix3d frame;
 
   double rate() const {
-    return std::sqrt((inertia[2] - inertia[1]) * (angular * angular - 2 * energy * inertia[0]) / (inertia[0] * inertia[1] * inertia[2]));
+    return std::sqrt((inertia[2] - inertia[1]) * (angular * angular - 2 * energy * inertia[0]) /
+                     (inertia[0] * inertia[1] * inertia[2]));
   }
   double modulus() const {
     return std::sqrt((inertia[1] - inertia[0]) * (2 * energy * inertia[2] - angular * angular) /
@@ -214,7 +217,8 @@ struct TriaxialTop {
     double cn, dn;
     const double sn = boost::math::jacobi_elliptic(modulus(), rate() * t, &cn, &dn);
     const double a = 2 * energy * inertia[2] - angular * angular, b = angular * angular - 2 * energy * inertia[0];
-    return Vec3(std::sqrt(a / (inertia[0] * (inertia[2] - inertia[0]))) * cn, std::sqrt(a / (inertia[1] * (inertia[2] - inertia[1]))) * sn,
+    return Vec3(std::sqrt(a / (inertia[0] * (inertia[2] - inertia[0]))) * cn,
+                std::sqrt(a / (inertia[1] * (inertia[2] - inertia[1]))) * sn,
                 std::sqrt(b / (inertia[2] * (inertia[2] - inertia[0]))) * dn);
   }
   /// Rate of the precession about L: the third Euler angle, which takes a quadrature.
@@ -226,8 +230,8 @@ struct TriaxialTop {
     const int pieces = 1 + static_cast<int>(20 * t);
     double sum = 0;
     for (int p = 0; p < pieces; ++p)
-      sum += boost::math::quadrature::gauss<double, 20>::integrate([this](double s) { return precession_rate(s); }, t * p / pieces,
-                                                                   t * (p + 1) / pieces);
+      sum += boost::math::quadrature::gauss<double, 20>::integrate([this](double s) { return precession_rate(s); },
+                                                                   t * p / pieces, t * (p + 1) / pieces);
     return sum;
   }
   /// From the principal axes to the world.
@@ -285,9 +289,10 @@ TEST(RigidMotion, a_tumbling_top_is_where_jacobi_s_functions_say) {
     lowest = std::min(lowest, in_body[1]);
     highest = std::max(highest, in_body[1]);
   }
-  std::printf("tumbling top, 10000 steps of 1e-4 s at 9 rad/s: attitude off by %.1e rad, spin in the body by %.1e, energy by %.1e "
-              "(relative)\n",
-              worst, worst_spin, worst_energy);
+  std::printf(
+      "tumbling top, 10000 steps of 1e-4 s at 9 rad/s: attitude off by %.1e rad, spin in the body by %.1e, energy by %.1e "
+      "(relative)\n",
+      worst, worst_spin, worst_energy);
   EXPECT_LT(lowest, -1.0);
   EXPECT_GT(highest, 1.0) << "it does not tumble";
   EXPECT_LE(worst, 1e-6);
@@ -468,7 +473,8 @@ TEST(RigidMotion, tied_in_one_direction_it_turns_about_that_axis_only) {
     }
     EXPECT_LE(angle_between(pose.turn(), turned(start + 0.5 * rate, along)), 1e-10);
     EXPECT_LE((motion.spin() - (start + rate) * along).norm(), 1e-10 * rate);
-    EXPECT_NEAR(motion.kinetic_energy(), 0.5 * motion.mass() * motion.velocity().squaredNorm() + 0.5 * inertia * std::pow(start + rate, 2),
+    EXPECT_NEAR(motion.kinetic_energy(),
+                0.5 * motion.mass() * motion.velocity().squaredNorm() + 0.5 * inertia * std::pow(start + rate, 2),
                 1e-10 * motion.kinetic_energy());
   }
 }
@@ -515,7 +521,8 @@ TEST(RigidMotion, parts_that_are_tied_together_keep_momentum_and_angular_momentu
 
 TEST(RigidMotion, two_balls_tied_together_lose_the_energy_of_their_relative_motion) {
   const double m1 = 2, m2 = 3, r1 = 0.3, r2 = 0.2, d = r1 + r2;
-  const double reduced = m1 * m2 / (m1 + m2), i1 = 0.4 * m1 * r1 * r1, i2 = 0.4 * m2 * r2 * r2, across = i1 + i2 + reduced * d * d;
+  const double reduced = m1 * m2 / (m1 + m2), i1 = 0.4 * m1 * r1 * r1, i2 = 0.4 * m2 * r2 * r2,
+               across = i1 + i2 + reduced * d * d;
   const auto lost = [&](const Vec3& relative, double spin1, double spin2) {  // line of centres along x, spins about it
     const Vec3 drift(3, 2, 1);
     const RigidPart balls[] = {RigidPart::granule(m1, r1, Vec3(1, 1, 1), drift, Vec3(spin1, 0, 0)),
@@ -523,10 +530,11 @@ TEST(RigidMotion, two_balls_tied_together_lose_the_energy_of_their_relative_moti
     return balls[0].kinetic_energy() + balls[1].kinetic_energy() - RigidMotion(balls, 2).kinetic_energy();
   };
   EXPECT_NEAR(lost(Vec3(-2, 0, 0), 0, 0), 0.5 * reduced * 4, 1e-12) << "head on: all of it";
-  EXPECT_NEAR(lost(Vec3(0, 2, 0), 0, 0), 0.5 * reduced * 4 * (i1 + i2) / across, 1e-12) << "past each other: they go round each other";
+  EXPECT_NEAR(lost(Vec3(0, 2, 0), 0, 0), 0.5 * reduced * 4 * (i1 + i2) / across, 1e-12)
+      << "past each other: they go round each other";
   EXPECT_NEAR(lost(Vec3::Zero(), 5, -3), 0.5 * i1 * i2 / (i1 + i2) * 64, 1e-12) << "spins about the line of centres";
-  EXPECT_NEAR(lost(Vec3(-2, 1, -3), 5, -3),
-              0.5 * reduced * (4 + 10 * (i1 + i2) / across) + 0.5 * i1 * i2 / (i1 + i2) * 64, 1e-12);
+  EXPECT_NEAR(lost(Vec3(-2, 1, -3), 5, -3), 0.5 * reduced * (4 + 10 * (i1 + i2) / across) + 0.5 * i1 * i2 / (i1 + i2) * 64,
+              1e-12);
   EXPECT_NEAR(lost(Vec3::Zero(), 4, 4), 0.0, 1e-12) << "one rigid motion: nothing";
 }
 
@@ -587,7 +595,8 @@ TEST(RigidMotion, quaternions_stay_normal_and_agree_after_a_million_drifts) {
   const Matrix3d before = inverse_inertia(motion);
   const double energy = motion.kinetic_energy();
   const Pose pose = flown(motion, 1000000, 1e-5);
-  const double off = std::abs(pose.quaternion().norm() - 1), skew = (pose.turn() * pose.turn().transpose() - Matrix3d::Identity()).norm();
+  const double off = std::abs(pose.quaternion().norm() - 1),
+               skew = (pose.turn() * pose.turn().transpose() - Matrix3d::Identity()).norm();
   // the motion keeps an attitude of its own
   const double apart = (inverse_inertia(motion) - pose.turn() * before * pose.turn().transpose()).norm() / before.norm();
   const double energy_off = std::abs(motion.kinetic_energy() - energy) / energy;

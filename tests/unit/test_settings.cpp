@@ -1,4 +1,4 @@
-#include "settings.h"
+#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <fstream>
@@ -6,9 +6,8 @@
 #include <set>
 #include <sstream>
 
-#include <gtest/gtest.h>
-
 #include "input_error.h"
+#include "settings.h"
 
 namespace solidcull {
 namespace {
@@ -117,8 +116,7 @@ TEST(Settings, keywords_come_in_any_order_and_the_last_word_counts) {
 TEST(Settings, the_limits_themselves_are_allowed) {
   for (const char* line : {"every 1", "every 2000000000", "depth 50", "calm 1", "tolerance 0 0.1", "tolerance 0.1 0", "carve 1 1",
                            "voxel 0.1", "depth 4 voxel 2", "depth 1 voxel 0.5", "speed 1e-9", "walls closed", "walls surface",
-                           "motion rigid", "motion fixed",
-                           "mesh 1 a.vdb", "mesh 1 a.stl", "mesh 1 a.vtp", "bed 1 a.vtp"})
+                           "motion rigid", "motion fixed", "mesh 1 a.vdb", "mesh 1 a.stl", "mesh 1 a.vtp", "bed 1 a.vtp"})
     EXPECT_EQ(refusal(line), "") << line;
 }
 
@@ -145,7 +143,8 @@ const Refusal refusals[] = {
     {"every 10.5", "keyword 'every' has the value '10.5': give a whole number of steps, 1 or more"},
     {"every 1e3", "keyword 'every' has the value '1e3': give a whole number of steps, 1 or more"},
     {"every often", "keyword 'every' has the value 'often': give a whole number of steps, 1 or more"},
-    {"every 99999999999999999999", "keyword 'every' has the value '99999999999999999999': give a whole number of steps, 1 or more"},
+    {"every 99999999999999999999",
+     "keyword 'every' has the value '99999999999999999999': give a whole number of steps, 1 or more"},
     {"every", "keyword 'every' ends too early: give a whole number of steps, 1 or more"},
     {"every calm 3", "keyword 'every' has the value 'calm': give a whole number of steps, 1 or more"},
 
@@ -177,10 +176,14 @@ const Refusal refusals[] = {
     {"tolerance 3 calm 3", "keyword 'tolerance' has the value 'calm': give two numbers A R, 0 or more and not both 0"},
     {"tolerance", "keyword 'tolerance' ends too early: give two numbers A R, 0 or more and not both 0"},
 
-    {"carve 0 4", "keyword 'carve' has the value '0': give two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"},
-    {"carve 2 0.9", "keyword 'carve' has the value '0.9': give two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"},
-    {"carve big 4", "keyword 'carve' has the value 'big': give two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"},
-    {"carve 2", "keyword 'carve' ends too early: give two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"},
+    {"carve 0 4",
+     "keyword 'carve' has the value '0': give two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"},
+    {"carve 2 0.9",
+     "keyword 'carve' has the value '0.9': give two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"},
+    {"carve big 4",
+     "keyword 'carve' has the value 'big': give two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"},
+    {"carve 2",
+     "keyword 'carve' ends too early: give two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"},
 
     {"motion floating", "keyword 'motion' has the value 'floating': give 'rigid' or 'fixed'"},
     {"motion", "keyword 'motion' ends too early: give 'rigid' or 'fixed'"},
@@ -213,10 +216,12 @@ const Refusal refusals[] = {
     {"voxel 2", "voxel 2.0 is too coarse for depth 2.0: choose voxel <= depth/2"},
     {"depth 0.8", "voxel 0.5 is too coarse for depth 0.8: choose voxel <= depth/2"},
 
-    {"deptth 2", "unknown keyword 'deptth': choose from bed, calm, carve, depth, every, exterior, mesh, motion, restore, speed, store, "
-                 "tolerance, voxel, walls"},
-    {"calm 3 4", "unknown keyword '4': choose from bed, calm, carve, depth, every, exterior, mesh, motion, restore, speed, store, "
-                 "tolerance, voxel, walls"},
+    {"deptth 2",
+     "unknown keyword 'deptth': choose from bed, calm, carve, depth, every, exterior, mesh, motion, restore, speed, store, "
+     "tolerance, voxel, walls"},
+    {"calm 3 4",
+     "unknown keyword '4': choose from bed, calm, carve, depth, every, exterior, mesh, motion, restore, speed, store, "
+     "tolerance, voxel, walls"},
 };
 
 INSTANTIATE_TEST_SUITE_P(Refusals, SettingsRefuse, testing::ValuesIn(refusals), [](const auto& info) {
@@ -252,15 +257,18 @@ std::vector<std::string> section(const std::string& heading) {
   std::vector<std::string> lines;
   bool inside = false;
   for (std::string line; std::getline(page, line);) {
-    if (line.rfind("## ", 0) == 0) inside = line == "## " + heading;
-    else if (inside) lines.push_back(line);
+    if (line.rfind("## ", 0) == 0)
+      inside = line == "## " + heading;
+    else if (inside)
+      lines.push_back(line);
   }
   EXPECT_FALSE(lines.empty()) << "no section " << heading;
   return lines;
 }
 
 TEST(CommandPage, has_lammps_headings) {
-  for (const char* heading : {"Syntax", "Examples", "Description", "Restart and output info", "Restrictions", "Related", "Default"})
+  for (const char* heading :
+       {"Syntax", "Examples", "Description", "Restart and output info", "Restrictions", "Related", "Default"})
     section(heading);
 }
 

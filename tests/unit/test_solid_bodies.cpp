@@ -1,4 +1,4 @@
-#include "solid_bodies.h"
+#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-#include <gtest/gtest.h>
+#include "solid_bodies.h"
 
 namespace solidcull {
 namespace {
@@ -18,9 +18,9 @@ using Tags = std::set<std::int64_t>;
 struct Solid {
   SolidBodies bodies;
   FrozenContacts contacts;
-  std::map<std::int64_t, MovingGranule> granules;           // world frame; of the locked ones: as they were when they were locked
-  std::map<std::int64_t, SolidBodies::Place> places;        // of the locked ones
-  std::set<int> parents;                                    // bodies that lost a part in the last unlock()
+  std::map<std::int64_t, MovingGranule> granules;     // world frame; of the locked ones: as they were when they were locked
+  std::map<std::int64_t, SolidBodies::Place> places;  // of the locked ones
+  std::set<int> parents;                              // bodies that lost a part in the last unlock()
 
   Solid() { contacts.set_layout({}); }
   /// In the frame of its present body, even while its place is still that in a body that was swallowed.
@@ -570,8 +570,9 @@ void carve_down_to_three(const std::vector<std::size_t>& batches) {
   const MassProperties due = sum_of(solid, three);
   const double mass = std::abs(is.mass - due.mass) / due.mass, centre = (is.centre() - due.centre()).norm() / 1e-3,
                inertia = (is.inertia() - due.inertia()).norm() / due.inertia().norm();
-  std::printf("100000 granules carved down to 3 in %zu steps: mass off by %.1e, centre by %.1e radii, inertia by %.1e (relative)\n",
-              batches.size(), mass, centre, inertia);
+  std::printf(
+      "100000 granules carved down to 3 in %zu steps: mass off by %.1e, centre by %.1e radii, inertia by %.1e (relative)\n",
+      batches.size(), mass, centre, inertia);
   EXPECT_EQ(is.count, 3);
   EXPECT_LE(mass, 1e-9);
   EXPECT_LE(centre, 1e-9);
@@ -641,7 +642,8 @@ struct Kept {
     angular = std::max(angular, (is.angular - was.angular).norm() / was.angular_sizes);
   }
   void tell(const char* what) const {
-    std::printf("%s: momentum %.1e, angular momentum %.1e; from the bodies' figures %.1e (relative)\n", what, linear, angular, booked);
+    std::printf("%s: momentum %.1e, angular momentum %.1e; from the bodies' figures %.1e (relative)\n", what, linear, angular,
+                booked);
     EXPECT_LE(linear, 1e-12) << what;
     EXPECT_LE(angular, 1e-12) << what;
     EXPECT_LE(booked, 1e-12) << what;
@@ -757,8 +759,9 @@ TEST(SolidBodiesInFlight, locking_merging_carving_and_splitting_keep_the_momenta
       // nothing that was locked before has moved in its body
       const SolidBody& b = solid.bodies.bodies().begin()->second;
       for (const auto& p : solid.places)
-        places_flown_in_body = std::max(places_flown_in_body, std::abs((b.pose.to_world(p.second.position) - b.motion.centre()).norm() -
-                                                                       (solid.mass(p.first).position - b.mass.centre()).norm()));
+        places_flown_in_body =
+            std::max(places_flown_in_body, std::abs((b.pose.to_world(p.second.position) - b.motion.centre()).norm() -
+                                                    (solid.mass(p.first).position - b.mass.centre()).norm()));
     }
 
     // granules go on with the field, bodies come apart
@@ -842,7 +845,8 @@ TEST(SolidBodiesInFlight, what_chips_off_leaves_the_velocity_field_of_the_body_a
     }
   }
   EXPECT_GT(parts, 100u);
-  std::printf("fields of %zu parts: off by %.1e, by %.1e as the motion that they go on with (relative)\n", parts, worst, worst_settled);
+  std::printf("fields of %zu parts: off by %.1e, by %.1e as the motion that they go on with (relative)\n", parts, worst,
+              worst_settled);
   EXPECT_LE(worst, 1e-12);
   EXPECT_LE(worst_settled, 1e-12);
 }
@@ -1006,7 +1010,8 @@ TEST(SolidBodiesInPeriodicBoxes, what_comes_off_a_ring_is_a_straight_chain_that_
     MassProperties straight;
     for (int k = 2; k < 7; ++k) straight.add(1 + 0.1 * k, Vec3(0.5 * k, 5 + 0.1 * (k % 3), 5), 0.26);
     EXPECT_LT((off.mass.inertia() - straight.inertia()).norm(), 1e-12);
-    for (const int k : {2, 4, 6}) EXPECT_LT((solid.now(k).position - solid.now(3).position).norm(), 2.0) << "its places lie together";
+    for (const int k : {2, 4, 6})
+      EXPECT_LT((solid.now(k).position - solid.now(3).position).norm(), 2.0) << "its places lie together";
   }
 }
 
@@ -1065,8 +1070,10 @@ TEST(SolidBodiesInPeriodicBoxes, parts_merge_through_the_border) {
       if (by_a_granule) order.erase(std::find(order.begin(), order.end(), cut));
       for (const int k : order) solid.lock(k);
       ASSERT_EQ(solid.bodies.size(), 2u);
-      if (by_a_granule) solid.lock(cut);
-      else solid.join(cut, cut + 1);
+      if (by_a_granule)
+        solid.lock(cut);
+      else
+        solid.join(cut, cut + 1);
       ASSERT_EQ(solid.bodies.size(), 1u);
       for (const bool adopted : {false, true}) {
         if (adopted) solid.adopt();
@@ -1128,7 +1135,8 @@ TEST(SolidBodiesInPeriodicBoxes, moving_bodies_merge_through_the_border_and_keep
     solid.adopt();
     places = std::max(places, largest_difference(world_places(solid), after));
   }
-  std::printf("merging through the border: momentum %.1e, angular momentum %.1e (relative), places %.1e m\n", linear, angular, places);
+  std::printf("merging through the border: momentum %.1e, angular momentum %.1e (relative), places %.1e m\n", linear, angular,
+              places);
   EXPECT_LE(linear, 1e-12);
   EXPECT_LE(angular, 1e-12);
   EXPECT_LE(places, 1e-12);

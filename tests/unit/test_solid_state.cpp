@@ -1,9 +1,9 @@
-#include "solid_state.h"
+#include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include <gtest/gtest.h>
+#include "solid_state.h"
 
 namespace solidcull {
 namespace {
@@ -93,7 +93,7 @@ TEST(SolidStateLaw, rest_counts_translation_and_the_speed_of_the_surface) {
   const double r = 0.002;
   EXPECT_TRUE(law.at_rest(Vec3(0, 0.0099, 0), Vec3::Zero(), r));
   EXPECT_FALSE(law.at_rest(Vec3(0, 0.0101, 0), Vec3::Zero(), r));
-  EXPECT_TRUE(law.at_rest(Vec3::Zero(), Vec3(4.9, 0, 0), r));   // 0.01 / 0.002 = 5 rad/s
+  EXPECT_TRUE(law.at_rest(Vec3::Zero(), Vec3(4.9, 0, 0), r));  // 0.01 / 0.002 = 5 rad/s
   EXPECT_FALSE(law.at_rest(Vec3::Zero(), Vec3(5.1, 0, 0), r));
 }
 

@@ -1,9 +1,9 @@
-#include "sphere_cells.h"
+#include <gtest/gtest.h>
 
 #include <random>
 #include <set>
 
-#include <gtest/gtest.h>
+#include "sphere_cells.h"
 
 namespace solidcull {
 namespace {
@@ -143,7 +143,8 @@ TEST(SphereCells, a_visit_that_says_false_is_the_last) {
   SphereCells cells;
   cells.build(random.spheres(100, Vec3::Ones(), 0.01, 0.02), 0.1);
   int visits = 0;
-  EXPECT_FALSE(cells.for_each_in_box(Vec3::Constant(-1), Vec3::Constant(1), [&](std::size_t, const Sphere&) { return ++visits < 7; }));
+  EXPECT_FALSE(
+      cells.for_each_in_box(Vec3::Constant(-1), Vec3::Constant(1), [&](std::size_t, const Sphere&) { return ++visits < 7; }));
   EXPECT_EQ(visits, 7);
 }
 

@@ -1,8 +1,8 @@
-#include "wake_up.h"
+#include <gtest/gtest.h>
 
 #include <cmath>
 
-#include <gtest/gtest.h>
+#include "wake_up.h"
 
 namespace solidcull {
 namespace {
