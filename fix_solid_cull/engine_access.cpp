@@ -2,11 +2,16 @@
 // the compiler against the engine's own headers, so a LIGGGHTS that names these members otherwise does not compile.
 #include "engine_access.h"
 
+#include <algorithm>
+
 #include "fix.h"
 #include "fix_contact_history.h"
 #include "fix_insert.h"
 #include "fix_insert_pack.h"
+#include "memory.h"
 #include "modify.h"
+#include "neigh_list.h"
+#include "neighbor.h"
 #include "thermo.h"
 
 namespace solidcull::engine {
@@ -30,6 +35,13 @@ SOLIDCULL_EXPOSE(HistoryNames, FixContactHistory, char**, history_id_)
 SOLIDCULL_EXPOSE(InsertCompress, FixInsert, bool, compress_flag)
 SOLIDCULL_EXPOSE(PackRegion, FixInsertPack, LAMMPS_NS::Region*, ins_region)
 SOLIDCULL_EXPOSE(ThermoAtoms, Thermo, LAMMPS_NS::bigint, last_natoms)
+SOLIDCULL_EXPOSE(HistoryIntPages, FixContactHistory, LAMMPS_NS::MyPage<int>*, ipage_)
+SOLIDCULL_EXPOSE(HistoryPages, FixContactHistory, LAMMPS_NS::MyPage<double>*, dpage_)
+SOLIDCULL_EXPOSE(ListAtoms, NeighList, int, maxatoms)
+SOLIDCULL_EXPOSE(NeighborAtoms, Neighbor, int, maxatom)
+SOLIDCULL_EXPOSE(HeldPlaces, Neighbor, double**, xhold)
+SOLIDCULL_EXPOSE(HeldRadii, Neighbor, double*, rhold)
+SOLIDCULL_EXPOSE(HeldAtoms, Neighbor, int, maxhold)
 #undef SOLIDCULL_EXPOSE
 
 std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify) { return *(modify.*member(ModifyFixMap())); }
@@ -45,6 +57,32 @@ void expect_atoms(LAMMPS_NS::Thermo& thermo, long change) { thermo.*member(Therm
 const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::Fix* fix) {
   const auto* pack = dynamic_cast<const LAMMPS_NS::FixInsertPack*>(fix);
   return pack ? pack->*member(PackRegion()) : nullptr;
+}
+
+void renew_pages(LAMMPS_NS::FixContactHistory& fix, int one_atom, int page) {
+  (fix.*member(HistoryIntPages()))->init(one_atom, page);
+  (fix.*member(HistoryPages()))->init(one_atom * std::max(1, fix.get_dnum()), page);
+}
+
+void shrink_lists(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Memory& memory, int atoms) {
+  for (int l = 0; l < neighbor.nlist; ++l) {
+    LAMMPS_NS::NeighList* list = neighbor.lists[l];
+    if (!list || !list->growflag) continue;
+    if (list->ipage) list->ipage->init(list->oneatom, list->pgsize);
+    if (list->dpage) list->dpage->init(list->dnum * list->oneatom, list->dnum * list->pgsize);
+    list->inum = 0;
+    list->*member(ListAtoms()) = 0;
+    list->grow(atoms);
+  }
+  neighbor.*member(NeighborAtoms()) = atoms;
+  // where atoms were at the last build; the next build makes it anew
+  double**& places = neighbor.*member(HeldPlaces());
+  double*& radii = neighbor.*member(HeldRadii());
+  if (places) memory.destroy(places);
+  if (radii) memory.destroy(radii);
+  places = nullptr;
+  radii = nullptr;
+  neighbor.*member(HeldAtoms()) = 0;
 }
 
 }  // namespace solidcull::engine

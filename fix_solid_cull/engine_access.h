@@ -9,7 +9,9 @@ class Fix;
 class FixContactHistory;
 class FixInsert;
 class LAMMPS;
+class Memory;
 class Modify;
+class Neighbor;
 class Region;
 class Thermo;
 }  // namespace LAMMPS_NS
@@ -32,6 +34,10 @@ bool compresses_tags(const LAMMPS_NS::FixInsert& fix);
 /// Thermo output stops the run when it counts fewer atoms than the time before ("Lost atoms"): tells it of atoms that went into
 /// the store (negative) or came back, so that truly lost ones are still found.
 void expect_atoms(LAMMPS_NS::Thermo& thermo, long change);
+/// Empties the pages that hold contact histories, for so many contacts of one atom and in a page.
+void renew_pages(LAMMPS_NS::FixContactHistory& fix, int one_atom, int page);
+/// Empties all neighbour lists and cuts their arrays to so many atoms.
+void shrink_lists(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Memory& memory, int atoms);
 /// The region that an insert/pack or insert/rate fix fills.
 const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::Fix* fix);
 

@@ -69,7 +69,9 @@ FixSolidCull::FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
       histories_(lmp),
       records_(lmp, this),
       pair_force_(lmp),
-      walls_(lmp) {
+      walls_(lmp),
+      mesh_loads_(lmp),
+      memory_(lmp) {
   if (domain->triclinic) refuse("the box is triclinic: use an orthogonal one");
   if (force->newton_pair) refuse("newton is on: put 'newton off' at the top of the deck");
   if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->sphere_flag)
@@ -256,7 +258,7 @@ void FixSolidCull::find_scales() {
           const Vec3 middle = observer_.to_world(0.5 * (lo + hi));
           const Vec3 half =
               turned_half_box(observer_.turn(), 0.5 * (hi - lo) + Vec3::Constant(store_->largest_radius() + closing()));
-          for_each_stored_in_box(middle - half, middle + half, [&](const StoredGranule& g) {
+          for_each_stored_in_box(middle - half, middle + half, [&](const Resident& g) {
             visit({observer_.to_frame(nearest_image(in_world(g), middle)), g.radius});
           });
         });
@@ -289,6 +291,7 @@ void FixSolidCull::init() {
   refuse_what_cannot_be_culled();
   histories_.connect();
   walls_.connect();
+  mesh_loads_.connect();
   const std::vector<bool> flips = histories_.flips();
   if (contacts_.size() > 0 && flips != contacts_.layout())
     refuse("the contact model's history has changed from " + std::to_string(contacts_.width()) + " to " +
@@ -336,9 +339,14 @@ void FixSolidCull::pre_initial_integrate() {
   if (g != gravity_then_) watch_effective_gravity(true);
   gravity_then_ = g;
   see_walls(true);
-  if (any_rank(!waking_.empty() || !waking_bodies_.empty())) next_reneighbor = update->ntimestep;
-  const std::int64_t interval = static_cast<std::int64_t>(look_every_) * look_factor_;
-  next_look_ = ((update->ntimestep - 1) / interval + 1) * interval;
+  if (any_rank(!waking_.empty() || !waking_bodies_.empty())) ask_for_build(update->ntimestep);
+  next_look_ = ((update->ntimestep - 1) / look_every_ + 1) * look_every_;
+  if (locked_everywhere_ == 0 && !settings_.every) {
+    quick_looks_ = settings_.calm;
+    next_look_ = update->ntimestep + quick_interval() - 1;
+  }
+  no_cull_until_ = -1;
+  worth_ = WorthWatch();
 }
 
 // ------------------------------------------------------------------------------------------------------------ the time step
@@ -368,7 +376,7 @@ void FixSolidCull::check_invariants() {
   const int bit = group->bitmask[interface_group_];
   for (int i = 0; i < atom->nlocal + atom->nghost; ++i) {
     if (atom->mask[i] & bit) continue;
-    for_each_stored_near(sphere(i), 0.0, [&](const StoredGranule& g) {
+    for_each_stored_near(sphere(i), 0.0, [&](const Resident& g) {
       broken("exterior granule " + std::to_string(atom->tag[i]) + " touches interior granule " + std::to_string(g.tag));
     });
   }
@@ -376,7 +384,7 @@ void FixSolidCull::check_invariants() {
     if (shell_[i].locked && store_bodies_ > 1)
       for_each_stored_near(
           sphere(i), 0.0,
-          [&](const StoredGranule& g) {
+          [&](const Resident& g) {
             broken("granule " + std::to_string(atom->tag[i]) + " of another body touches interior granule " +
                    std::to_string(g.tag));
           },
@@ -385,8 +393,9 @@ void FixSolidCull::check_invariants() {
   if (ledger_.count_due() != static_cast<std::int64_t>(store_->size()))
     broken("the ledger has " + std::to_string(ledger_.count_due()) + " granules in the store, which holds " +
            std::to_string(store_->size()));
-  const double mass = store_->mass();
-  if (std::abs(ledger_.mass_error(*store_)) > 1e-12 * mass) broken("mass in the store differs from the ledger");
+  const double mass = store_->mass_recounted();
+  if (std::abs(ledger_.mass_error(*store_)) > 1e-12 * mass || std::abs(store_->mass() - mass) > 1e-12 * mass)
+    broken("mass in the store differs from the ledger");
   // every locked granule is a member of a body, and nothing else is
   std::size_t locked = store_->size();
   for (int i = 0; i < atom->nlocal; ++i) locked += shell_[i].locked;
@@ -399,15 +408,18 @@ void FixSolidCull::check_invariants() {
     if (!e.locked) continue;
     if (e.body != bodies_.body_of(atom->tag[i]))
       broken("interface granule " + std::to_string(atom->tag[i]) + " stands in the wrong body");
-    sums[e.body].add(atom->rmass[i], e.place, atom->radius[i]);
+    sums[e.body].add(atom->rmass[i], e.place, atom->radius[i], +1, e.held);
   }
-  store_->for_each([&](const StoredGranule& g) {
+  store_->for_each([&](const Resident& r) {
+    const StoredGranule g = store_->get(r.tag);
     if (g.body != bodies_.body_of(g.tag)) broken("interior granule " + std::to_string(g.tag) + " lies in the wrong body");
-    sums[g.body].add(g.mass, g.position, g.radius);
+    if (store_->frame_of(g.body) == GranuleStore::shared_frame && !(bodies_.body(g.body).grounded && bodies_.pose(g.body) == Pose()))
+      broken("body " + std::to_string(g.body) + " moves and lies among those that stand still");
+    sums[g.body].add(g.mass, g.position, g.radius, +1, g.held);
   });
   for (const auto& [number, sum] : sums) {
     const MassProperties& m = bodies_.body(number).mass;
-    if (m.count != sum.count || std::abs(m.mass - sum.mass) > 1e-12 * sum.mass ||
+    if (m.count != sum.count || m.held != sum.held || std::abs(m.mass - sum.mass) > 1e-12 * sum.mass ||
         (m.centre() - sum.centre()).norm() > 1e-9 * domain->prd[0])
       broken("body " + std::to_string(number) + " has other mass properties than its granules");
   }
@@ -419,6 +431,7 @@ void FixSolidCull::setup_pre_force(int) {
 }
 
 void FixSolidCull::pre_force(int) {
+  mesh_loads_.begin_step();
   if (!lists_are_new_) return;
   lists_are_new_ = false;
   leave_locked_pairs_out();
@@ -491,7 +504,7 @@ void FixSolidCull::ask_for_reneighbouring_if_waking() {
   }
   int asked[2] = {waking || (rigid() && body_comes_too_far(wake_together + 1)), rigid() && body_is_fast(wake_together + 1)};
   if (comm->nprocs > 1) MPI_Allreduce(MPI_IN_PLACE, asked, 2, MPI_INT, MPI_MAX, world);
-  if (asked[0]) next_reneighbor = update->ntimestep + 1;
+  if (asked[0]) ask_for_build(update->ntimestep + 1);
   fast_bodies_ = asked[1];
 }
 
@@ -505,7 +518,7 @@ void FixSolidCull::pre_final_integrate() {
   ask_for_reneighbouring_if_waking();
   if (update->ntimestep == next_look_) {
     look();
-    if (any_rank(!waking_.empty() || !waking_bodies_.empty())) next_reneighbor = update->ntimestep + 1;
+    if (any_rank(!waking_.empty() || !waking_bodies_.empty())) ask_for_build(update->ntimestep + 1);
   }
   if (stored_everywhere_ > 0) open_for_insertion();
 }
@@ -564,15 +577,16 @@ void FixSolidCull::sum_carried() {
   Vec3 momentum = Vec3::Zero(), turning = Vec3::Zero(), moment = Vec3::Zero();
   double energy = 0;
   if (store_)
-    store_->for_each([&](const StoredGranule& g) {
+    store_->for_each([&](const Resident& g) {
       const Twist& twist = bodies_.body(g.body).twist;
       const Vec3 x = in_world(g);
-      const RigidPart p = RigidPart::granule(g.mass, g.radius, x, twist.at(x), twist.spin);
-      mass += g.mass;
-      momentum += g.mass * p.velocity;
+      const double m = store_->get(g.tag).mass;
+      const RigidPart p = RigidPart::granule(m, g.radius, x, twist.at(x), twist.spin);
+      mass += m;
+      momentum += m * p.velocity;
       turning += p.angular_momentum(Vec3::Zero());
       energy += p.kinetic_energy();
-      moment += g.mass * x;
+      moment += m * x;
     });
   carried_ = {momentum[0], momentum[1], momentum[2], turning[0], turning[1], turning[2],
               energy,      moment[0],   moment[1],   moment[2],  mass};

@@ -10,9 +10,11 @@
 #include <vector>
 
 #include "contact_histories.h"
+#include "engine_memory.h"
 #include "fix.h"
 #include "flat_map.h"
 #include "frozen_contacts.h"
+#include "frozen_wall_loads.h"
 #include "granule_records.h"
 #include "granule_store.h"
 #include "halo.h"
@@ -20,6 +22,7 @@
 #include "interface_mesh.h"
 #include "interface_mesh_source.h"
 #include "ledger.h"
+#include "mesh_loads.h"
 #include "pair_force.h"
 #include "settings.h"
 #include "shell_entry.h"
@@ -29,6 +32,7 @@
 #include "stop_watch.h"
 #include "wake_up.h"
 #include "wall_contacts.h"
+#include "worth.h"
 
 namespace solidcull {
 
@@ -105,11 +109,15 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   double surface_reach() const;  // how far a granule can change another one's depth (m)
 
   bool rigid() const { return settings_.motion == Motion::rigid; }
+  bool sleeping() const { return settings_.exterior == Exterior::sleep; }
+  bool needs_surface() const { return settings_.exterior == Exterior::live; }
 
   // --- fix_solid_cull_bodies.cpp: how solid bodies move -------------------------------------------------------------------
   struct ActiveBody {
     int number;
     SolidBody* body;
+    bool stands = false;               // grounded, or all bodies are fixed
+    Vec3 change = Vec3::Zero();        // of the load on its interface granules since they were locked (N)
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // N and N m about the centre of mass, of the whole body
     double reach = 0,
            way = 0;  // of its interior granules: farthest from the centre; bound of their way since the last reneighbouring (m)
@@ -130,6 +138,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   bool body_is_fast(int steps) const;
   void place_interface_granules();
   void give_velocities();
+  void give_velocity(std::size_t k, const std::vector<FieldInFrame>& fields);
+  void follow_loads(int swallowed, int kept);
   void settle_bodies();
   void adopt_places();
   void group_bodies();
@@ -144,36 +154,54 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void split_bodies();
   double kinetic_energy(int body) const;
   Vec3 nearest_image(const Vec3& x, const Vec3& to) const;
-  Vec3 in_world(const StoredGranule& g) const { return bodies_.pose(g.body).to_world(g.position); }
+  Vec3 in_world(const Resident& g) const { return bodies_.pose(g.body).to_world(g.position); }
   double store_slack() const;  // how far outside its subdomain a rank may hold a stored granule (m)
+  /// Of a frame of the store: that of its body, or the world.
+  const Pose& pose_of_frame(int frame) const {
+    static const Pose world;
+    return frame == GranuleStore::shared_frame ? world : bodies_.pose(frame);
+  }
 
-  /// Stored granules whose surface is closer than `gap` to the sphere's (world frame), but for those of the body `except`.
+  /// Stored granules whose surface is closer than `gap` to the sphere's (world frame), but for those of the body `except` (a key).
   template <class Visit>
   void for_each_stored_near(const Sphere& s, double gap, Visit visit, int except = 0) const {
-    store_->for_each_body([&](int body, const Vec3&, const Vec3&) {
-      if (except && key_of(body) == except) return;
-      const Pose& pose = bodies_.pose(body);
+    store_->for_each_frame([&](int frame, const Vec3&, const Vec3&) {
+      const bool shared = frame == GranuleStore::shared_frame;
+      if (except && !shared && key_of(frame) == except) return;
+      const Pose& pose = pose_of_frame(frame);
       for (const Vec3& shift : halo_.image_shifts())
-        store_->for_each_near(body, {pose.to_frame(s.centre + shift), s.radius}, gap, visit);
+        store_->for_each_near(frame, {pose.to_frame(s.centre + shift), s.radius}, gap, [&](const Resident& g) {
+          if (!except || !shared || key_of(g.body) != except) visit(g);
+        });
     });
   }
-  /// Stored granules in the box (world frame), and some around it.
+  /// Stored granules in the box (world frame), and some around it; of one frame, if one is given.
   template <class Visit>
-  void for_each_stored_in_box(const Vec3& lo, const Vec3& hi, Visit visit, int only = 0) const {
+  void for_each_stored_in_box(const Vec3& lo, const Vec3& hi, Visit visit, int only = -1) const {
     const Vec3 middle = 0.5 * (lo + hi), half = 0.5 * (hi - lo);
-    store_->for_each_body([&](int body, const Vec3&, const Vec3&) {
-      if (only && body != only) return;
-      const Pose& pose = bodies_.pose(body);
+    store_->for_each_frame([&](int frame, const Vec3&, const Vec3&) {
+      if (only >= 0 && frame != only) return;
+      const Pose& pose = pose_of_frame(frame);
       const Vec3 reach = turned_half_box(pose.turn().transpose(), half);
       for (const Vec3& shift : halo_.image_shifts()) {
         const Vec3 at = pose.to_frame(middle + shift);
-        store_->for_each_in_box(body, at - reach, at + reach, visit);
+        store_->for_each_in_box(frame, at - reach, at + reach, visit);
       }
     });
   }
 
+  // --- fix_solid_cull_ground.cpp: bodies that walls hold --------------------------------------------------------------------
+  bool stands_still(int body) const;  // its granules at still walls may go to the store
+  void ground_bodies();
+  void set_grounded(int body, bool on);
+  void share_out_loads();
+  void press_on_walls();
+  void find_frame(int body);
+  void forget_body(int body);
+
   // --- fix_solid_cull_look.cpp: what is in solid state, deep enough, exposed -----------------------------------------------
   void look();
+  void choose_asleep();
   bool find_calm();
   bool can_be_culled(int mask) const;
   void pause_where_bodies_wake();
@@ -184,9 +212,17 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void choose();
   void find_exposed();
   void prepare_locking();
-  void schedule_next_look(std::int64_t chosen, std::int64_t exterior);
+  void judge_worth(std::int64_t chosen, std::int64_t exterior);
+  void schedule_next_look();
+  int quick_interval() const;
+  void ask_for_build(std::int64_t step);
 
   // --- fix_solid_cull_membership.cpp: exterior <-> interface <-> interior --------------------------------------------------
+  struct Foreign {
+    Sphere sphere;
+    int body;     // key; 0: exterior
+    bool stands;  // the body does
+  };
   struct Ball {
     Vec3 centre;
     double radius;
@@ -199,21 +235,28 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void tell_neighbours();
   void count_bodies();
   void share_exterior();
+  Foreign as_foreign(int i) const;
+  bool frame_stands(int frame) const;
   void keep_shell_closed();
   void freeze_contacts();
   void freeze_inner_contacts();
+  void note_fresh(std::int64_t tag, std::int64_t partner, const double* history);
   void freeze_histories();
   void share_bodies();
   void thaw_contacts();
   void lock_into_bodies();
   void free_from_bodies();
-  void store_what_is_deep();
+  void store_what_is_deep(bool change);
+  void fit_memory();
   void publish_atom_counts();
   void label_bodies();
   void lock(int i);
   void unlock(int i);
+  void clear_map();
   int bring_back(std::int64_t tag);
   void put_away(int i);
+  void change_of_stored(const StoredGranule& g, int sign);
+  bool may_leave_its_walls(const ShellEntry& e) const;
   void restore_all();
   void move_home();
   double contact_reach() const;
@@ -248,6 +291,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   GranuleRecords records_;
   PairForce pair_force_;
   WallContacts walls_;
+  MeshLoads mesh_loads_;
+  EngineMemory memory_;
 
   // scales of the deck, found at the first run
   double diameter_ = 0;      // mean granule diameter (m)
@@ -267,6 +312,14 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::unique_ptr<GranuleStore> store_;
   FrozenContacts contacts_;
   SolidBodies bodies_;
+  FrozenWallLoads wall_loads_;     // of stored granules
+  struct Sum {
+    Vec3 value = Vec3::Zero();
+  };
+  FlatMap<Sum> stored_change_;    // body -> what its stored granules carried of change of load when they went in, summed (N)
+  FlatMap<int> rested_;            // body -> looks in a row at which it was at rest at a wall that stands still
+  FlatMap<Sum> pressed_;          // grounded body -> running mean of what presses on it since it was locked (N)
+  std::set<int> lifting_;          // grounded bodies that the walls might not hold any more
   Ledger ledger_;
   std::map<int, InterfaceMesh> meshes_;
   bool meshes_wanted_ = false;
@@ -310,27 +363,22 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::vector<Ball> balls_;
   FlatMap<int> index_of_;
   std::vector<std::int64_t> freed_, locked_now_;
-  struct Foreign {
-    Sphere sphere;
-    int body;  // key; 0: exterior
-  };
   std::vector<Foreign> halo_foreign_;  // other ranks' and periodic images' exterior and interface granules
   std::int64_t stored_everywhere_ = 0;
   std::int64_t locked_everywhere_ = 0;
   int store_bodies_ = 0;         // bodies on all ranks: with one alone, none can come near another
-  bool shell_reopened_ = false;  // the shell grew by granules that something came near to
+  std::size_t stay_near_ = 0;    // interface granules that stayed atoms the last time because something is near
+  bool shell_changed_ = false;   // by granules that something came near to, or that nothing is near any more
   FlatMap<char> freed_anywhere_, locked_anywhere_;
   FlatMap<int> ghost_body_;      // tag -> key of the body of an interface ghost
   std::vector<int> freed_keys_;  // bodies that wake as a whole, by key, in this change
-  struct FreshContact {
-    std::int64_t tag, partner;
-    std::vector<double> history;  // as tag sees it, world frame
-  };
-  std::vector<FreshContact> fresh_contacts_;
+  std::vector<std::pair<std::int64_t, std::int64_t>> fresh_contacts_;  // frozen in this change
+  std::vector<double> fresh_histories_;                                // theirs, as the first sees it, world frame
   std::vector<double> joins_;  // rows (place of a, a, b): resting against another body for long enough
   struct Arrival {
     SolidBodies::Place at;
     double mass = 0, radius = 0;
+    bool held = false;
   };
   FlatMap<Arrival> arriving_;  // interface granules handed over by another rank in this reneighbouring
 
@@ -351,7 +399,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
     Pose pose;                  // of the body, against still walls
     std::vector<Vec3> corners;  // of triangles that can move, seen from the body
   };
-  std::map<int, SeenWalls> clear_of_walls_;  // when bodies were last compared with walls
+  std::map<int, SeenWalls> clear_of_walls_;  // when frames of the store were last compared with walls
   std::map<int, Pose> at_home_, drawn_;      // and with the ranks' subdomains and the surface
   Pose observer_;                            // the frame in which the implicit surface is drawn: that of the largest body
   int observed_ = 0;                         // that body
@@ -360,14 +408,22 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::vector<int> locked_index_;   // atom indices of interface granules since the last reneighbouring
   std::vector<int> locked_slot_;    // their bodies in active_
   std::vector<Vec3> locked_place_;  // and places there
+  std::vector<std::size_t> riding_;  // those of them whose bodies move
   bool locked_index_stale_ = true;
+  std::vector<int> motion_words_;  // of a record: what is of no worth once a step has passed
+  std::int64_t stored_at_ = -1;    // step in which granules last went into the store
   bool lists_are_new_ = false;
+  bool map_cleared_ = false;
   bool thawed_ = false;
   bool after_setup_ = false;
   bool new_run_ = false;
   int interface_group_ = -1;
-  int look_factor_ = 1;  // looks less often where nothing can be culled
+  WorthWatch worth_;
+  std::int64_t judged_at_ = -1;             // step of the last judgement
+  std::int64_t builds_asked_ = 0;           // neighbour lists built because this fix asked, since then
+  std::int64_t restored_then_ = 0;          // granules restored until then
   bool told_no_worth_ = false;
+  int quick_looks_ = 0;  // left at the start of a run in which nothing is culled yet
   std::int64_t next_look_ = -1;
   std::int64_t membership_version_ = 0;
   double largest_excess_ = 0;

@@ -51,10 +51,19 @@ void FixSolidCull::refresh_locked() {
   locked_index_.clear();
   locked_slot_.clear();
   locked_place_.clear();
+  riding_.clear();
   FlatMap<int> slot;
+  FlatMap<char> has_atoms;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (shell_[i].locked && shell_[i].body > 0) has_atoms[shell_[i].body] = 1;
   for (auto& b : bodies_.bodies()) {
+    // what sleeps on the ground and has no atoms costs nothing
+    const auto spans = groups_.find(b.first);
+    const bool spanning = spans != groups_.end() && std::binary_search(spanning_.begin(), spanning_.end(), spans->second.key);
+    if (b.second.grounded && !spanning && !has_atoms.contains(b.first) && !stored_change_.contains(b.first)) continue;
     slot[b.first] = static_cast<int>(active_.size());
     active_.push_back({b.first, &b.second});
+    active_.back().stands = stands_still(b.first);
     const auto group = groups_.find(b.first);
     if (group == groups_.end()) continue;
     const auto at = std::lower_bound(spanning_.begin(), spanning_.end(), group->second.key);
@@ -62,7 +71,9 @@ void FixSolidCull::refresh_locked() {
   }
   store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
     const int* s = slot.find(body);
-    if (!s) broken("interior granules belong to body " + std::to_string(body) + ", which is not there");
+    if (!s && !bodies_.bodies().count(body))
+      broken("interior granules belong to body " + std::to_string(body) + ", which is not there");
+    if (!s || active_[*s].stands) return;
     const SolidBody& b = *active_[*s].body;
     active_[*s].reach = (b.pose.to_world(0.5 * (lo + hi)) - b.motion.centre()).norm() + 0.5 * (hi - lo).norm();
   });
@@ -72,6 +83,7 @@ void FixSolidCull::refresh_locked() {
     if (!s) broken("interface granule " + std::to_string(atom->tag[i]) + " belongs to no body");
     locked_index_.push_back(i);
     locked_slot_.push_back(*s);
+    if (!active_[*s].stands) riding_.push_back(locked_index_.size() - 1);
     locked_place_.push_back(shell_[i].place);
   }
 }
@@ -90,7 +102,7 @@ void FixSolidCull::take_loads() {
   largest_excess_ = 0;
   const bool moves = rigid();
   const Vec3 g = gravity();
-  for (ActiveBody& a : active_) a.force = a.torque = Vec3::Zero();
+  for (ActiveBody& a : active_) a.force = a.torque = a.change = Vec3::Zero();
   double** force = atom->f;
   for (std::size_t k = 0; k < locked_index_.size(); ++k) {
     const int i = locked_index_[k];
@@ -103,6 +115,7 @@ void FixSolidCull::take_loads() {
       e.fresh = false;
     }
     e.load_change = load - e.reference;
+    if (active_[locked_slot_[k]].stands) active_[locked_slot_[k]].change += e.load_change;
     const double tolerance = wake_up_.tolerance(atom->rmass[i], e.normal_load);
     const double square = e.load_change.squaredNorm();
     if (square > e.excess * e.excess * tolerance * tolerance) e.excess = std::sqrt(square) / tolerance;
@@ -110,24 +123,30 @@ void FixSolidCull::take_loads() {
     set(force[i], Vec3::Zero());
     set(atom->torque[i], Vec3::Zero());
   }
+  if (sleeping())
+    for (ActiveBody& a : active_)
+      if (const Sum* stored = a.stands ? stored_change_.find(a.number) : nullptr) a.change += stored->value;
   if (moves) sum_over_bodies();
+  if (sleeping()) press_on_walls();
 }
 
 void FixSolidCull::sum_over_bodies() {
   // contacts and other forces on interface granules are there; gravity pulls the whole mass
   for (ActiveBody& a : active_) a.torque += (a.body->pose.origin() - a.body->motion.centre()).cross(a.force);
   if (!spanning_.empty()) {
-    std::vector<double> sums(6 * spanning_.size(), 0.0);
+    std::vector<double> sums(9 * spanning_.size(), 0.0);
     for (const ActiveBody& a : active_)
       for (int d = 0; d < 3 && a.spanning >= 0; ++d) {
-        sums[6 * a.spanning + d] += a.force[d];
-        sums[6 * a.spanning + 3 + d] += a.torque[d];
+        sums[9 * a.spanning + d] += a.force[d];
+        sums[9 * a.spanning + 3 + d] += a.torque[d];
+        sums[9 * a.spanning + 6 + d] += a.change[d];
       }
     MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, world);
     for (ActiveBody& a : active_)
       if (a.spanning >= 0) {
-        a.force = vec(&sums[6 * a.spanning]);
-        a.torque = vec(&sums[6 * a.spanning + 3]);
+        a.force = vec(&sums[9 * a.spanning]);
+        a.torque = vec(&sums[9 * a.spanning + 3]);
+        a.change = vec(&sums[9 * a.spanning + 6]);
       }
   }
   const Vec3 g = gravity();
@@ -140,6 +159,7 @@ void FixSolidCull::post_integrate() {
   const double dt = update->dt;
   const int periodic[3] = {domain->xperiodic, domain->yperiodic, domain->zperiodic};
   for (ActiveBody& a : active_) {
+    if (a.stands) continue;
     SolidBody& b = *a.body;
     b.motion.kick(a.force, a.torque, 0.5 * dt);
     b.pose.advance(b.motion.drift(dt));
@@ -186,7 +206,7 @@ struct FixSolidCull::FieldInFrame {
 void FixSolidCull::place_interface_granules() {
   const bool periodic = domain->xperiodic || domain->yperiodic || domain->zperiodic;
   const std::vector<FieldInFrame> fields = fields_of_bodies();
-  for (std::size_t k = 0; k < locked_index_.size(); ++k) {
+  for (const std::size_t k : riding_) {
     const int i = locked_index_[k];
     const SolidBody& b = *active_[locked_slot_[k]].body;
     const Vec3 x = b.pose.to_world(locked_place_[k]);
@@ -207,19 +227,23 @@ void FixSolidCull::final_integrate() {
   if (!store_ || !rigid() || active_.empty()) return;
   const auto timed = watch_.time(Part::load);
   for (ActiveBody& a : active_) {
+    if (a.stands) continue;
     a.body->motion.kick(a.force, a.torque, 0.5 * update->dt);
     a.body->twist = a.body->motion.twist();
   }
-  give_velocities();
+  const std::vector<FieldInFrame> fields = fields_of_bodies();
+  for (const std::size_t k : riding_) give_velocity(k, fields);
 }
 
 void FixSolidCull::give_velocities() {
   const std::vector<FieldInFrame> fields = fields_of_bodies();
-  for (std::size_t k = 0; k < locked_index_.size(); ++k) {
-    const int i = locked_index_[k];
-    set(atom->v[i], fields[locked_slot_[k]].at(locked_place_[k]));
-    set(atom->omega[i], active_[locked_slot_[k]].body->twist.spin);
-  }
+  for (std::size_t k = 0; k < locked_index_.size(); ++k) give_velocity(k, fields);
+}
+
+void FixSolidCull::give_velocity(std::size_t k, const std::vector<FieldInFrame>& fields) {
+  const int i = locked_index_[k];
+  set(atom->v[i], fields[locked_slot_[k]].at(locked_place_[k]));
+  set(atom->omega[i], active_[locked_slot_[k]].body->twist.spin);
 }
 
 // ------------------------------------------------------------------------------------------------------------ which bodies
@@ -298,6 +322,17 @@ void FixSolidCull::group_bodies() {
   }
 }
 
+void FixSolidCull::follow_loads(int swallowed, int kept) {
+  wall_loads_.merge(swallowed, kept);
+  for (FlatMap<Sum>* sums : {&stored_change_, &pressed_})
+    if (const Sum* gone = sums->find(swallowed)) {
+      const Vec3 moved = gone->value;
+      (*sums)[kept].value += moved;
+      sums->erase(swallowed);
+    }
+  rested_.erase(swallowed);
+}
+
 void FixSolidCull::adopt_places() {
   // granules of swallowed bodies move to the frame of the body that they are part of now
   for (int i = 0; i < atom->nlocal; ++i) {
@@ -336,6 +371,7 @@ void FixSolidCull::adopt_places() {
       g.load_change = turn * g.load_change;
       contacts_.turn(g.tag, turn, [&](std::int64_t partner) { return partner > g.tag || !bodies_.body_of(partner); });
     });
+    follow_loads(gone.first, body);
     clear_of_walls_.erase(gone.first);
     at_home_.erase(gone.first);
     drawn_.erase(gone.first);
@@ -345,6 +381,7 @@ void FixSolidCull::adopt_places() {
       at_home_.erase(body);
     }
     if (observed_ == gone.first) observed_ = 0;
+    if (sleeping()) find_frame(body);
   }
   merges_.clear();
   for (const auto& m : bodies_.take_merges()) merges_.push_back({m.first, m.second, bodies_.pose(m.second)});
@@ -360,6 +397,7 @@ void FixSolidCull::settle_bodies() {
     // what was a part of a larger body may have become a body of its own without a change of its granules
     body.changed = body.changed || body.spanned != spans;
     body.spanned = spans;
+    if (body.grounded && !spans && body.mass.held == 0) set_grounded(number, false);  // what held it has gone
     if (spans || !body.changed) continue;
     const RigidPart part = body.part();
     body.motion = RigidMotion(&part, 1, body.free_axes());
@@ -367,7 +405,7 @@ void FixSolidCull::settle_bodies() {
     body.changed = false;
   }
   if (spanning_.empty()) return;
-  constexpr int columns = 23;
+  constexpr int columns = 25;
   std::vector<double> rows;
   for (auto& [number, body] : bodies_.bodies()) {
     const Group& group = groups_.at(number);
@@ -378,9 +416,11 @@ void FixSolidCull::settle_bodies() {
     rows.insert(rows.end(), p.inertia.data(), p.inertia.data() + 9);
     for (const Vec3& v : {p.velocity, p.spin}) rows.insert(rows.end(), v.data(), v.data() + 3);
     for (const bool s : body.spans) rows.push_back(s);
+    rows.insert(rows.end(), {double(body.grounded), double(body.mass.held)});
   }
   rows = halo_.gather_all(rows);
   std::map<int, std::vector<RigidPart>> parts;
+  std::map<int, std::pair<bool, bool>> ground;  // some part is grounded, some part is held
   for (std::size_t r = 0; r < rows.size(); r += columns) {
     RigidPart p;
     const int key = static_cast<int>(rows[r]);
@@ -390,16 +430,20 @@ void FixSolidCull::settle_bodies() {
     p.velocity = vec(&rows[r + 14]);
     p.spin = vec(&rows[r + 17]);
     parts[key].push_back(p);
+    ground[key].first |= rows[r + 23] != 0;
+    ground[key].second |= rows[r + 24] != 0;
     for (int d = 0; d < 3; ++d) group_spans_[key][d] |= rows[r + 20 + d] != 0;
   }
   for (auto& [number, body] : bodies_.bodies()) {
     const Group& group = groups_.at(number);
     const auto all = parts.find(group.key);
     if (all == parts.end()) continue;
+    set_grounded(number, ground[group.key].first && ground[group.key].second);
     SolidBody whole;
     whole.spans = group_spans_[group.key];
     body.motion = RigidMotion(all->second.data(), static_cast<int>(all->second.size()), whole.free_axes());
     body.motion.shift(-group.shift);
+    if (body.grounded) body.motion.stop();
     body.twist = body.motion.twist();
     body.changed = false;
   }
@@ -417,6 +461,11 @@ void FixSolidCull::watch_effective_gravity(bool new_gravity) {
   // the mean acceleration over the time in which a wave crosses the body: what it feels as a whole
   const Vec3 g = gravity();
   const std::int64_t now = update->ntimestep;
+  if (g != gravity_then_)  // what stands still feels gravity alone
+    for (const auto& [number, b] : bodies_.bodies())
+      if (b.grounded && wake_up_.gravity_changed(b.pose.turned_to_frame(g), b.felt_known ? b.felt : gravity_then_,
+                                                 static_cast<double>(b.mass.count)))
+        wake_body(key_of(number));
   for (const ActiveBody& a : active_) {
     SolidBody& b = *a.body;
     const double granules = (rigid() ? b.motion.mass() : b.mass.mass) * static_cast<double>(b.mass.count) / b.mass.mass;
@@ -428,6 +477,11 @@ void FixSolidCull::watch_effective_gravity(bool new_gravity) {
       if (!b.felt_known) b.felt = g;
       b.felt_known = true;
       if (wake_up_.gravity_changed(g, b.felt, granules)) wake_body(key_of(a.number));
+      continue;
+    }
+    if (b.grounded) {
+      if (!b.felt_known) b.felt = b.pose.turned_to_frame(g);
+      b.felt_known = true;
       continue;
     }
     if (new_gravity) {

@@ -166,12 +166,13 @@ void FixSolidCull::write_bed_file(const std::string& pattern) {
                                               : GranuleState::interface_;
     row(vec(atom->x[i]), vec(atom->v[i]), atom->radius[i], atom->tag[i], atom->type[i], state, vector_atom[i]);
   }
-  store_->for_each([&](const StoredGranule& g) {
+  store_->for_each([&](const Resident& g) {
     const Twist& twist = bodies_.body(g.body).twist;
     double x[3];
     set(x, in_world(g));
     domain->remap(x);
-    row(vec(x), twist.at(in_world(g)), g.radius, static_cast<double>(g.tag), g.type, GranuleState::interior,
+    row(vec(x), twist.at(in_world(g)), g.radius, static_cast<double>(g.tag), store_->get(g.tag).type,
+        GranuleState::interior,
         comm->nprocs == 1 ? g.body : key_of(g.body));
   });
   rows = halo_.gather_root(rows);

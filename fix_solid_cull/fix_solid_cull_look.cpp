@@ -33,8 +33,8 @@ constexpr int longest_wait = 10;
 constexpr double wall_still_there = 0.01;
 // looks that culling waits after bodies woke as a whole
 constexpr int shortest_pause = 2, longest_pause = 32;
-// where looks find nothing, they come up to this many times more seldom
-constexpr int largest_look_factor = 16;
+// the first looks of a run, until something is culled, come this many times as often
+constexpr int quick = 5;
 
 }  // namespace
 
@@ -47,10 +47,18 @@ void FixSolidCull::look() {
   pause_where_bodies_wake();
   const bool may_cull = update->ntimestep >= no_cull_until_;
   bool candidates = false;
-  if (may_cull) candidates = find_calm();
+  joins_.clear();
+  if (may_cull)
+    candidates = find_calm();
+  else
+    for (int i = 0; i < atom->nlocal; ++i)
+      if (!shell_[i].locked) shell_[i].calm = 0;
   const bool any_candidates = any_rank(candidates), any_locked = any_rank(!locked_index_.empty());
   chosen_.clear();
-  if (any_candidates || any_locked) {
+  if (!needs_surface()) {
+    choose_asleep();
+    ground_bodies();
+  } else if (any_candidates || any_locked) {
     const auto timed_depth = watch_.time(Part::depth);
     follow_with_surface();
     register_with_surface();
@@ -63,10 +71,16 @@ void FixSolidCull::look() {
   MPI_Allreduce(MPI_IN_PLACE, counts, 3, MPI_INT64_T, MPI_SUM, world);
   if (counts[0] > 0) {
     prepare_locking();
-    if (counts[0] >= worth_share * static_cast<double>(counts[1]) || counts[2] > 0) next_reneighbor = update->ntimestep + 1;
+    if (counts[0] >= worth_share * static_cast<double>(counts[1]) || counts[2] > 0) ask_for_build(update->ntimestep + 1);
   }
-  if (any_rank(!joins_.empty())) next_reneighbor = update->ntimestep + 1;
-  schedule_next_look(counts[0], counts[1]);
+  if (any_rank(!joins_.empty())) ask_for_build(update->ntimestep + 1);
+  if (may_cull && quick_looks_ == 0) {
+    judge_worth(counts[0], counts[1]);
+  } else {
+    builds_asked_ = 0;
+    restored_then_ = ledger_.granules_restored();
+  }
+  schedule_next_look();
 }
 
 void FixSolidCull::pause_where_bodies_wake() {
@@ -97,17 +111,20 @@ void FixSolidCull::see_walls(bool new_run) {
   }
   const int owned = atom->nlocal;
   std::vector<int> touched(owned, 0), there(owned, 0);
-  std::vector<char> moves(owned, 0), near(owned, 0);
+  std::vector<char> moves(owned, 0), near(owned, 0), near_moving(owned, 0), stands(owned, 0);
   FlatMap<Sphere> moving_plugs;
   const double plug_radius = 0.5 * (settings_.depth * diameter_ + closing()) + diameter_;
   for (const WallContact& c : walls_.find()) {
     const int i = c.granule;
     near[i] = true;
+    near_moving[i] |= c.moving;
     if (c.gap <= wall_still_there * atom->radius[i]) ++there[i];
     if (c.gap <= 0) {
       ++touched[i];
       moves[i] = moves[i] || c.moving;
+      stands[i] = stands[i] || !c.moving;
     }
+    if (!needs_surface()) continue;
     const ShellEntry& e = shell_[i];
     if (settings_.walls == Walls::surface || c.gap > wall_closes * atom->radius[i]) continue;
     if (c.moving && !e.locked && e.calm == 0) continue;
@@ -155,6 +172,8 @@ void FixSolidCull::see_walls(bool new_run) {
     e.walls = touched[i];
     e.wall_moves = moves[i];
     e.wall_near = near[i];
+    e.moving_wall_near = near_moving[i];
+    e.stands = stands[i];
   }
 }
 
@@ -166,7 +185,7 @@ std::vector<Vec3> FixSolidCull::accelerations() const {
     for (std::size_t k = 0; k < locked_index_.size(); ++k) {
       const ActiveBody& b = active_[locked_slot_[k]];
       const int i = locked_index_[k];
-      a[i] = b.body->motion.acceleration(b.body->pose.to_world(shell_[i].place), b.force, b.torque);
+      if (!b.stands) a[i] = b.body->motion.acceleration(b.body->pose.to_world(shell_[i].place), b.force, b.torque);
     }
   if (!halo_.needed()) return a;
   std::vector<double> rows;
@@ -182,6 +201,9 @@ std::vector<Vec3> FixSolidCull::accelerations() const {
 
 bool FixSolidCull::find_calm() {
   const int owned = atom->nlocal;
+  // over a shorter time less motion tells it from rest
+  SolidStateLaw law = solid_state_;
+  if (quick_looks_ > 0 && locked_everywhere_ == 0) law.speed /= quick;
   std::vector<char> touching(owned, 0), moving(owned, 0), loaded(owned, 0), drifting(owned, 0);
   std::vector<Vec3> around(owned, Vec3::Zero());  // sum of mass times acceleration of what each granule touches
   std::vector<double> mass(owned, 0.0);
@@ -203,7 +225,7 @@ bool FixSolidCull::find_calm() {
       if (square > reach * reach) continue;
       const MovingSphere b = state(j);
       const double radii = a.radius + b.radius;
-      const bool pressed = square < radii * radii, drifts = !pressed && !solid_state_.still_neighbour(a, b);
+      const bool pressed = square < radii * radii, drifts = !pressed && !law.still_neighbour(a, b);
       loaded[i] |= pressed;
       drifting[i] |= drifts;
       if (j < owned) {
@@ -218,7 +240,7 @@ bool FixSolidCull::find_calm() {
         around[j] += atom->rmass[i] * acceleration[i];
         mass[j] += atom->rmass[i];
       }
-      const bool quiet = solid_state_.quiet_contact(a, b);
+      const bool quiet = law.quiet_contact(a, b);
       if (shell_[i].locked && key_of_atom(j)) {
         between_bodies.push_back({i, j});
         if (quiet) continue;
@@ -240,17 +262,17 @@ bool FixSolidCull::find_calm() {
       // a wall is a neighbour too; that it is accelerated itself is not known here
       const double all = mass[i] + (e.walls > 0 ? atom->rmass[i] : 0.0);
       const Vec3 v = vec(atom->v[i]), frame = around[i] / all;
-      solid = solid_state_.balanced(acceleration[i], frame);
+      solid = law.balanced(acceleration[i], frame);
       const double passed = static_cast<double>(update->ntimestep - e.lock_step) * update->dt;
-      if (solid && (e.calm == 0 || !solid_state_.went_on(v - e.velocity, e.reference, frame, passed))) {
+      if (solid && (e.calm == 0 || !law.went_on(v - e.velocity, e.reference, frame, passed))) {
         e.calm = 0;  // calm begins here, with this motion
         e.velocity = v;
         e.reference = frame;
         e.lock_step = update->ntimestep;
       }
     } else if (solid) {
-      solid = solid_state_.at_rest(vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]) &&
-              solid_state_.balanced(acceleration[i], Vec3::Zero());
+      solid = law.at_rest(vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]) &&
+              law.balanced(acceleration[i], Vec3::Zero());
     }
     e.calm = solid ? e.calm + 1 : 0;
     candidates = candidates || e.calm >= settings_.calm;
@@ -350,14 +372,14 @@ void FixSolidCull::register_with_surface() {
       return;
     }
     if (largest_way(then->second, seen, lo, hi) <= moved) return;
-    store_->for_each_in_box(body, lo, hi, [&](const StoredGranule& g) {
+    store_->for_each_in_box(body, lo, hi, [&](const Resident& g) {
       surface_->touch({then->second.to_world(g.position), g.radius});
       surface_->touch({seen.to_world(g.position), g.radius});
     });
     then->second = seen;
   });
   if (shared) {
-    store_->for_each([&](const StoredGranule& g) {
+    store_->for_each([&](const Resident& g) {
       const Vec3 x = in_world(g);
       share(x, g.radius, x);
     });
@@ -393,6 +415,37 @@ void FixSolidCull::choose() {
     if (e.locked || e.calm < settings_.calm) continue;
     e.nearest_void = surface_->void_within(observer_.to_frame(vec(atom->x[i])), depth, e.nearest_void);
     if (!e.nearest_void.none()) {
+      e.waited = 0;
+      continue;
+    }
+    chosen_.push_back(atom->tag[i]);
+    if (++e.waited >= longest_wait) overdue_[atom->tag[i]] = 1;
+  }
+}
+
+void FixSolidCull::choose_asleep() {
+  // whoever is in solid state sleeps, but for a cover around what is not
+  overdue_.clear();
+  SphereCells awake;
+  const double cover = settings_.depth * diameter_;
+  if (cover > 0) {
+    std::vector<Sphere> spheres;
+    std::vector<double> rows;
+    for (int i = 0; i < atom->nlocal; ++i) {
+      if (shell_[i].locked || shell_[i].calm >= settings_.calm) continue;
+      const Sphere s = sphere(i);
+      spheres.push_back(s);
+      rows.insert(rows.end(), {s.centre[0], s.centre[1], s.centre[2], s.radius});
+    }
+    if (halo_.needed()) rows = halo_.exchange(rows, 4, cover + contact_reach());
+    if (halo_.needed())
+      for (std::size_t r = 0; r < rows.size(); r += 4) spheres.push_back({vec(&rows[r]), rows[r + 3]});
+    awake.build(std::move(spheres), std::max(cover, 2 * diameter_));
+  }
+  for (int i = 0; i < atom->nlocal; ++i) {
+    ShellEntry& e = shell_[i];
+    if (e.locked) continue;
+    if (e.calm < settings_.calm || (cover > 0 && awake.any_near(sphere(i), cover))) {
       e.waited = 0;
       continue;
     }
@@ -462,17 +515,51 @@ void FixSolidCull::prepare_locking() {
   }
 }
 
-void FixSolidCull::schedule_next_look(std::int64_t chosen, std::int64_t exterior) {
-  const bool worth = chosen > 0 || any_rank(!locked_index_.empty()) || stored_everywhere_ > 0;
-  look_factor_ = worth ? 1 : std::min(2 * look_factor_, largest_look_factor);
-  if (!worth && look_factor_ == largest_look_factor && !told_no_worth_) {
-    told_no_worth_ = true;
-    say("fix " + std::string(id) + " solid/cull: nothing among " + std::to_string(exterior) +
-        " granules can be culled now; looking every " + std::to_string(look_every_ * look_factor_) + " steps from here on");
+void FixSolidCull::judge_worth(std::int64_t chosen, std::int64_t exterior) {
+  std::int64_t counts[4] = {static_cast<std::int64_t>(locked_index_.size()), static_cast<std::int64_t>(store_->size()),
+                            ledger_.granules_restored() - restored_then_, atom->nlocal};
+  MPI_Allreduce(MPI_IN_PLACE, counts, 4, MPI_INT64_T, MPI_SUM, world);
+  const double steps = static_cast<double>(update->ntimestep - std::max(judged_at_, update->ntimestep - look_every_));
+  const double saved =
+      steps * (WorthWatch::interior * static_cast<double>(counts[1]) + WorthWatch::interface * static_cast<double>(counts[0]));
+  const double spent = static_cast<double>(counts[3]) * (WorthWatch::look + WorthWatch::build * static_cast<double>(builds_asked_)) +
+                       WorthWatch::wake * static_cast<double>(counts[2]);
+  judged_at_ = update->ntimestep;
+  builds_asked_ = 0;
+  restored_then_ = ledger_.granules_restored();
+  const bool culling = chosen + counts[0] + counts[1] > 0;
+  const int wait = worth_.judge(saved, spent, culling);
+  if (wait == 0) {
+    told_no_worth_ = told_no_worth_ && !culling;
+    return;
   }
-  if (worth) told_no_worth_ = false;
-  const std::int64_t interval = static_cast<std::int64_t>(look_every_) * look_factor_;
-  next_look_ = (update->ntimestep / interval + 1) * interval;
+  no_cull_until_ = std::max(no_cull_until_, update->ntimestep + static_cast<std::int64_t>(wait) * look_every_);
+  if (told_no_worth_ || !worth_.waits_longest()) return;
+  told_no_worth_ = true;
+  say("fix " + std::string(id) + " solid/cull: among " + std::to_string(exterior) +
+      " granules too few can be culled for it to pay; trying again every " + std::to_string(wait * look_every_) + " steps or more");
 }
+
+void FixSolidCull::ask_for_build(std::int64_t step) {
+  next_reneighbor = step;
+  ++builds_asked_;
+}
+
+void FixSolidCull::schedule_next_look() {
+  // a bed that rests when the run begins is culled at once; else a look comes in time for what it must watch
+  const std::int64_t now = update->ntimestep;
+  if (quick_looks_ > 0 && locked_everywhere_ == 0) {
+    --quick_looks_;
+    next_look_ = now + quick_interval();
+    return;
+  }
+  quick_looks_ = 0;
+  next_look_ = (now / look_every_ + 1) * look_every_;
+  if (locked_everywhere_ > 0 || stored_everywhere_ > 0) return;
+  const std::int64_t wait = (no_cull_until_ + look_every_ - 1) / look_every_ * look_every_;
+  next_look_ = std::max(next_look_, wait);
+}
+
+int FixSolidCull::quick_interval() const { return settings_.every ? look_every_ : std::max(look_every_ / quick, 5); }
 
 }  // namespace solidcull

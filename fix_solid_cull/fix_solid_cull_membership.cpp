@@ -27,6 +27,8 @@ namespace {
 constexpr double store_gap_in_skins = 2.5;
 // after this share of the atoms came or went, the engine sorts its arrays at once
 constexpr double sort_share = 0.05;
+// interface granules that nothing is near any more go to the store when they are this share of the atoms, or when more changes
+constexpr double store_share = 0.05;
 
 // walls are looked at again when a body has moved by this many skins; what is nearer than that and a margin becomes an atom
 constexpr double wall_check_in_skins = 0.25;
@@ -46,16 +48,24 @@ double FixSolidCull::contact_reach() const {
 }
 
 GranuleMass FixSolidCull::mass_of(std::int64_t tag) const {
-  const StoredGranule* g = store_->find(tag);
-  const int* i = g ? nullptr : index_of_.find(tag);
-  if (!g && !i) {
+  const bool stored = store_->contains(tag);
+  const int* i = stored ? nullptr : index_of_.find(tag);
+  if (!stored && !i) {
     const Arrival& a = *arriving_.find(tag);
     const Pose &from = bodies_.pose(a.at.body), &to = bodies_.pose(bodies_.body_of(tag));
-    return {a.mass, from == to ? a.at.position : to.to_frame(from.to_world(a.at.position)), a.radius};
+    return {a.mass, from == to ? a.at.position : to.to_frame(from.to_world(a.at.position)), a.radius, a.held};
   }
-  GranuleMass m =
-      g ? GranuleMass{g->mass, g->position, g->radius} : GranuleMass{atom->rmass[*i], shell_[*i].place, atom->radius[*i]};
-  const int stands_in = g ? g->body : shell_[*i].body, body = bodies_.body_of(tag);
+  GranuleMass m;
+  int stands_in;
+  if (stored) {
+    const StoredGranule g = store_->get(tag);
+    m = {g.mass, g.position, g.radius, g.held};
+    stands_in = g.body;
+  } else {
+    m = {atom->rmass[*i], shell_[*i].place, atom->radius[*i], shell_[*i].held};
+    stands_in = shell_[*i].body;
+  }
+  const int body = bodies_.body_of(tag);
   if (body && stands_in != body) {
     const Pose &from = bodies_.pose(stands_in), &to = bodies_.pose(body);
     if (from != to) m.position = to.to_frame(from.to_world(m.position));
@@ -68,7 +78,7 @@ MovingGranule FixSolidCull::moving(int i) const {
   // a granule that is locked has the motion that it had before
   const bool now = e.locked && e.lock_step == update->ntimestep;
   return {atom->rmass[i], atom->radius[i], vec(atom->x[i]), now ? e.velocity : vec(atom->v[i]),
-          now ? e.spin : vec(atom->omega[i])};
+          now ? e.spin : vec(atom->omega[i]), e.held};
 }
 
 std::vector<FixSolidCull::Ball> FixSolidCull::collect_balls() {
@@ -93,14 +103,21 @@ bool FixSolidCull::in_ball(const Vec3& x, double margin) const {
 
 void FixSolidCull::change_membership() {
   const auto timed = watch_.time(Part::membership);
+  if (stored_at_ >= 0 && stored_at_ != update->ntimestep) {
+    store_->forget_transient();
+    stored_at_ = -1;
+  }
   balls_ = collect_balls();
   std::vector<double> keys(waking_bodies_.begin(), waking_bodies_.end());
   keys = halo_.gather_all(keys);
   freed_keys_.assign(keys.begin(), keys.end());
   waking_bodies_.clear();
   const bool all = any_rank(wake_all_);
-  const bool change =
-      any_rank(all || !balls_.empty() || !freed_keys_.empty() || !chosen_.empty() || !joins_.empty() || open_for_insertion_);
+  const bool change = any_rank(all || !balls_.empty() || !freed_keys_.empty() || !chosen_.empty() || !joins_.empty() ||
+                               !lifting_.empty() || open_for_insertion_);
+  for (const int body : lifting_)
+    if (bodies_.bodies().count(body)) set_grounded(body, false);
+  lifting_.clear();
   freed_.clear();
   locked_now_.clear();
   freed_anywhere_.clear();
@@ -138,16 +155,16 @@ void FixSolidCull::change_membership() {
       share_exterior();
       keep_shell_closed();
     }
-    store_what_is_deep();
   }
+  if (change || (sleeping() && locked_everywhere_ > 0)) store_what_is_deep(change);
   if (rigid() && stored_everywhere_ > 0) fetch_from_outside();
-  if (change || any_rank(shell_reopened_)) publish_atom_counts();
+  if (change || any_rank(shell_changed_)) publish_atom_counts();
   hand_over();
   locked_before_.clear();
   for (int i = 0; i < atom->nlocal; ++i)
     if (shell_[i].locked && shell_[i].body > 0)
-      locked_before_.push_back({atom->tag[i], {atom->rmass[i], shell_[i].place, atom->radius[i]}});
-  shell_reopened_ = false;
+      locked_before_.push_back({atom->tag[i], {atom->rmass[i], shell_[i].place, atom->radius[i], shell_[i].held}});
+  shell_changed_ = false;
   wake_all_ = false;
   open_for_insertion_ = false;
   chosen_.clear();
@@ -155,6 +172,7 @@ void FixSolidCull::change_membership() {
   normal_loads_.clear();
   touches_.clear();
   joins_.clear();
+  if (memory_.too_large()) fit_memory();
   locked_index_stale_ = true;
   refresh_locked();
   if (rigid()) give_velocities();
@@ -193,8 +211,10 @@ void FixSolidCull::free_from_bodies() {
   split_bodies();
   for (const std::int64_t tag : freed_) {
     ShellEntry& e = shell_[*index_of_.find(tag)];
+    if (sleeping() && e.body && !bodies_.bodies().count(e.body)) forget_body(e.body);
     e.lock_step = -1;
     e.body = 0;
+    e.held = false;
   }
 }
 
@@ -220,6 +240,7 @@ void FixSolidCull::lock(int i) {
   e.excess = 0;
   e.calm = 0;
   e.waited = 0;
+  e.held = sleeping() && e.stands;
   e.lock_step = update->ntimestep;
   e.velocity = vec(atom->v[i]);
   e.spin = vec(atom->omega[i]);
@@ -244,10 +265,21 @@ void FixSolidCull::unlock(int i) {
   vector_atom[i] = 0;
 }
 
+void FixSolidCull::clear_map() {
+  // before the first atom comes or goes: the map is cleared by the tags of the atoms that are there
+  if (!atom->map_style || map_cleared_) return;
+  atom->map_clear();
+  map_cleared_ = true;
+}
+
 int FixSolidCull::bring_back(std::int64_t tag) {
+  clear_map();
   std::vector<double> record;
+  const bool still_there = store_->transient_known(tag);  // put away in this very step
   const StoredGranule g = store_->take(tag, record);
   ledger_.returned(g);
+  wall_loads_.erase(tag, g.body);
+  if (sleeping()) change_of_stored(g, -1);
   const int i = records_.append(record, g.layout);
   ShellEntry& e = shell_[i];
   e = ShellEntry();
@@ -257,12 +289,15 @@ int FixSolidCull::bring_back(std::int64_t tag) {
   e.place = g.position;
   e.load_change = g.load_change;
   e.normal_load = g.normal_load;
+  e.walls = g.walls;
+  e.held = g.held;
+  e.came_back = update->ntimestep;
   e.lock_step = g.lock_step;
   e.velocity = vec(atom->v[i]);
   e.spin = vec(atom->omega[i]);
   const SolidBody& body = bodies_.body(g.body);
   const Vec3 x = body.pose.to_world(g.position);
-  if (g.lock_step != update->ntimestep) set(atom->x[i], nearest_image(x, vec(atom->x[i])));  // else nothing has moved
+  if (!still_there) set(atom->x[i], nearest_image(x, vec(atom->x[i])));  // else nothing has moved
   set(atom->v[i], body.twist.at(x));
   set(atom->omega[i], body.twist.spin);
   e.registered = true;  // the implicit surface does not care who holds a granule
@@ -271,7 +306,14 @@ int FixSolidCull::bring_back(std::int64_t tag) {
   return i;
 }
 
+/// What presses on a body since it was locked, of its granules in the store.
+void FixSolidCull::change_of_stored(const StoredGranule& g, int sign) {
+  if (g.load_change.isZero(0)) return;
+  stored_change_[g.body].value += sign * g.load_change;
+}
+
 void FixSolidCull::put_away(int i) {
+  clear_map();
   ShellEntry& e = shell_[i];
   set(atom->v[i], e.velocity);
   set(atom->omega[i], e.spin);
@@ -288,7 +330,16 @@ void FixSolidCull::put_away(int i) {
   g.lock_step = e.lock_step;
   g.load_change = e.load_change;
   g.normal_load = e.normal_load;
-  store_->add(g, record.data(), static_cast<int>(record.size()));
+  g.walls = e.walls;
+  g.held = e.held;
+  if (e.walls > 0) wall_loads_.add(g.tag, g.body, mesh_loads_.of(g.tag));
+  if (sleeping()) change_of_stored(g, +1);
+  if (stored_at_ != update->ntimestep) {
+    stored_at_ = update->ntimestep;
+    const bool periodic = domain->xperiodic || domain->yperiodic || domain->zperiodic;  // the place tells which image
+    motion_words_ = records_.motion_words(i, !periodic);
+  }
+  store_->add(g, record.data(), static_cast<int>(record.size()), motion_words_);
   ledger_.stored(g);
   double& largest = largest_radius_by_type_[g.type];
   largest = std::max(largest, g.radius);
@@ -309,11 +360,9 @@ void FixSolidCull::free_what_wakes(bool all) {
     }
   std::vector<std::int64_t> stored;
   if (!whole.empty())
-    store_->for_each([&](const StoredGranule& g) {
-      if (whole.count(g.body)) stored.push_back(g.tag);
-    });
+    for (const int body : whole) store_->for_each_of_body(body, [&](const Resident& g) { stored.push_back(g.tag); });
   for (const Ball& b : balls_)
-    for_each_stored_in_box(b.centre - Vec3::Constant(b.radius), b.centre + Vec3::Constant(b.radius), [&](const StoredGranule& g) {
+    for_each_stored_in_box(b.centre - Vec3::Constant(b.radius), b.centre + Vec3::Constant(b.radius), [&](const Resident& g) {
       if (!whole.count(g.body) && (nearest_image(in_world(g), b.centre) - b.centre).squaredNorm() <= b.radius * b.radius)
         stored.push_back(g.tag);
     });
@@ -375,29 +424,44 @@ void FixSolidCull::share_exterior() {
   std::vector<double> rows;
   for (int i = 0; i < atom->nlocal; ++i)
     if (!shell_[i].locked || store_bodies_ > 1)
-      rows.insert(rows.end(), {atom->x[i][0], atom->x[i][1], atom->x[i][2], atom->radius[i],
-                               double(shell_[i].locked ? key_of(shell_[i].body) : 0)});
-  rows = halo_.exchange(rows, 5, contact_reach() + store_gap_in_skins * neighbor->skin + store_slack());
-  for (std::size_t r = 0; r < rows.size(); r += 5)
-    halo_foreign_.push_back({{vec(&rows[r]), rows[r + 3]}, static_cast<int>(rows[r + 4])});
+      rows.insert(rows.end(), {atom->x[i][0], atom->x[i][1], atom->x[i][2], atom->radius[i], double(as_foreign(i).body),
+                               double(as_foreign(i).stands)});
+  rows = halo_.exchange(rows, 6, contact_reach() + store_gap_in_skins * neighbor->skin + store_slack());
+  for (std::size_t r = 0; r < rows.size(); r += 6)
+    halo_foreign_.push_back({{vec(&rows[r]), rows[r + 3]}, static_cast<int>(rows[r + 4]), rows[r + 5] != 0});
 }
+
+FixSolidCull::Foreign FixSolidCull::as_foreign(int i) const {
+  const ShellEntry& e = shell_[i];
+  const bool in_body = e.locked && e.body > 0;  // else it has just been chosen
+  return {sphere(i), in_body ? key_of(e.body) : 0, in_body && stands_still(e.body)};
+}
+
+bool FixSolidCull::frame_stands(int frame) const { return frame == GranuleStore::shared_frame || stands_still(frame); }
 
 void FixSolidCull::keep_shell_closed() {
   const auto timed = watch_.time(Part::shell);
   const double gap = neighbor->skin;
   std::set<std::int64_t> near;
   // exterior granules, and the shells of other bodies
-  std::vector<Foreign> visitors = halo_foreign_;
+  bool some_move = false;  // of the bodies that have stored granules
+  store_->for_each_frame([&](int frame, const Vec3&, const Vec3&) { some_move = some_move || !frame_stands(frame); });
+  std::vector<Foreign> visitors;
+  const auto comes = [&](const Foreign& v) {
+    if (!v.stands || some_move) visitors.push_back(v);
+  };
+  for (const Foreign& v : halo_foreign_) comes(v);
   for (int i = 0; i < atom->nlocal; ++i)
-    if (!shell_[i].locked || store_bodies_ > 1) visitors.push_back({sphere(i), shell_[i].locked ? key_of(shell_[i].body) : 0});
-  store_->for_each_body([&](int body, const Vec3&, const Vec3&) {
-    const Pose& pose = bodies_.pose(body);
-    const int own = key_of(body);
+    if (!shell_[i].locked || store_bodies_ > 1) comes(as_foreign(i));
+  store_->for_each_frame([&](int frame, const Vec3&, const Vec3&) {
+    const Pose& pose = pose_of_frame(frame);
+    const int own = frame == GranuleStore::shared_frame ? -1 : key_of(frame);
+    const bool stands = frame_stands(frame);
     for (const Foreign& v : visitors)
-      if (v.body != own)
+      if (v.body != own && !(stands && v.stands))
         for (const Vec3& shift : halo_.image_shifts())
-          store_->for_each_near(body, {pose.to_frame(v.sphere.centre + shift), v.sphere.radius}, gap,
-                                [&](const StoredGranule& g) { near.insert(g.tag); });
+          store_->for_each_near(frame, {pose.to_frame(v.sphere.centre + shift), v.sphere.radius}, gap,
+                                [&](const Resident& g) { near.insert(g.tag); });
   });
   fetch_near_walls(near);
   if (open_for_insertion_)
@@ -410,10 +474,10 @@ void FixSolidCull::keep_shell_closed() {
       const Vec3 reach = Vec3::Constant(store_->largest_radius() + gap);
       for_each_stored_in_box(Vec3(region->extent_xlo, region->extent_ylo, region->extent_zlo) - reach,
                              Vec3(region->extent_xhi, region->extent_yhi, region->extent_zhi) + reach,
-                             [&](const StoredGranule& g) { near.insert(g.tag); });
+                             [&](const Resident& g) { near.insert(g.tag); });
     }
   for (const std::int64_t tag : near) bring_back(tag);
-  shell_reopened_ = shell_reopened_ || !near.empty();
+  shell_changed_ = shell_changed_ || !near.empty();
 }
 
 void FixSolidCull::fetch_near_walls(std::set<std::int64_t>& near) {
@@ -422,11 +486,14 @@ void FixSolidCull::fetch_near_walls(std::set<std::int64_t>& near) {
   const double skin = neighbor->skin, gap = wall_gap_in_skins * skin, enough = wall_check_in_skins * skin;
   const std::vector<WallContacts::Triangle> triangles = walls_.triangles();
   const Vec3 reach = Vec3::Constant(store_->largest_radius() + gap);
-  std::vector<int> moved;  // bodies that are to be compared with what stands still
-  store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
-    const Pose& pose = bodies_.pose(body);
-    const auto known = clear_of_walls_.find(body);
-    const bool against_still = known == clear_of_walls_.end() || largest_way(known->second.pose, pose, lo, hi) >= enough;
+  std::vector<int> moved;  // frames that are to be compared with what stands still
+  store_->for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
+    const Pose& pose = pose_of_frame(frame);
+    const auto known = clear_of_walls_.find(frame);
+    // walls that hold a body may have stored granules of it at them
+    const bool at_walls = sleeping() && frame_stands(frame) && !new_run_;
+    const bool against_still =
+        !at_walls && (known == clear_of_walls_.end() || largest_way(known->second.pose, pose, lo, hi) >= enough);
     // what moves is seen from the body: a wall that turns with it stays where it is
     std::vector<Vec3> corners;
     for (const WallContacts::Triangle& t : triangles)
@@ -436,29 +503,30 @@ void FixSolidCull::fetch_near_walls(std::set<std::int64_t>& near) {
     for (std::size_t k = 0; !against_moving && k < corners.size(); ++k)
       against_moving = (corners[k] - known->second.corners[k]).squaredNorm() >= enough * enough;
     if (!against_still && !against_moving) return;
-    SeenWalls& seen = clear_of_walls_[body];
+    SeenWalls& seen = clear_of_walls_[frame];
+    if (at_walls) seen.pose = pose;
     if (against_still) {
       seen.pose = pose;
-      moved.push_back(body);
+      moved.push_back(frame);
     }
     if (against_moving) seen.corners = std::move(corners);
     for (const WallContacts::Triangle& t : triangles)
       if (t.moving ? against_moving : against_still)
         for_each_stored_in_box(
             t.box.lo - reach, t.box.hi + reach,
-            [&](const StoredGranule& g) {
+            [&](const Resident& g) {
               if (!near.count(g.tag) && walls_.near(t, {nearest_image(in_world(g), 0.5 * (t.box.lo + t.box.hi)), g.radius}, gap))
                 near.insert(g.tag);
             },
-            body);
+            frame);
   });
   if (moved.empty()) return;
-  store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
-    if (std::find(moved.begin(), moved.end(), body) == moved.end()) return;
+  store_->for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
+    if (std::find(moved.begin(), moved.end(), frame) == moved.end()) return;
     // a ball around all of them first
-    const Sphere all{bodies_.pose(body).to_world(0.5 * (lo + hi)), 0.5 * (hi - lo).norm() + store_->largest_radius()};
+    const Sphere all{pose_of_frame(frame).to_world(0.5 * (lo + hi)), 0.5 * (hi - lo).norm() + store_->largest_radius()};
     if (!walls_.primitive_near(all, gap)) return;
-    store_->for_each_in_box(body, lo, hi, [&](const StoredGranule& g) {
+    store_->for_each_in_box(frame, lo, hi, [&](const Resident& g) {
       if (walls_.primitive_near({in_world(g), g.radius}, gap)) near.insert(g.tag);
     });
   });
@@ -473,18 +541,19 @@ void FixSolidCull::fetch_from_outside() {
     return false;
   };
   std::vector<std::int64_t> leaving;
-  store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
-    const Pose& pose = bodies_.pose(body);
+  store_->for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
+    if (frame_stands(frame)) return;
+    const Pose& pose = pose_of_frame(frame);
     if (!outside(pose.to_world(0.5 * (lo + hi)), 0.5 * (hi - lo).norm())) return;
     // the ball around them may stick out where they do not
     const Vec3 half = turned_half_box(pose.turn(), 0.5 * (hi - lo)), middle = pose.to_world(0.5 * (lo + hi));
     if (!outside(middle - half, 0) && !outside(middle + half, 0)) return;
-    store_->for_each_in_box(body, lo, hi, [&](const StoredGranule& g) {
+    store_->for_each_in_box(frame, lo, hi, [&](const Resident& g) {
       if (outside(in_world(g), 0)) leaving.push_back(g.tag);
     });
   });
   for (const std::int64_t tag : leaving) bring_back(tag);
-  shell_reopened_ = shell_reopened_ || !leaving.empty();
+  shell_changed_ = shell_changed_ || !leaving.empty();
 }
 
 void FixSolidCull::forget_lost_atoms() {
@@ -496,7 +565,7 @@ void FixSolidCull::forget_lost_atoms() {
   if (here != bodies_.locked() - store_->size()) {
     for (int i = 0; i < atom->nlocal; ++i) present[atom->tag[i]] = 1;
     for (const Locked& l : locked_before_)
-      if (!present.contains(l.tag) && bodies_.body_of(l.tag) && !store_->find(l.tag)) lost.push_back(l);
+      if (!present.contains(l.tag) && bodies_.body_of(l.tag) && !store_->contains(l.tag)) lost.push_back(l);
   }
   if (!any_rank(!lost.empty())) return;
   index_of_.clear();
@@ -511,10 +580,18 @@ void FixSolidCull::forget_lost_atoms() {
 }
 
 void FixSolidCull::split_bodies() {
+  std::set<int> came_off;
   bodies_.split(
       contacts_, [&](std::int64_t tag) { return mass_of(tag); },
       [&](std::int64_t tag, int body, const Vec3& place) {
-        if (store_->find(tag)) {
+        came_off.insert(body);
+        if (store_->contains(tag)) {
+          StoredGranule g = store_->get(tag);
+          if (store_->frame_of(g.body) == GranuleStore::shared_frame) store_->share(body, true);
+          wall_loads_.move(tag, g.body, body);
+          if (sleeping()) change_of_stored(g, -1);
+          g.body = body;
+          if (sleeping()) change_of_stored(g, +1);
           store_->move(tag, body, place);
           return;
         }
@@ -522,6 +599,10 @@ void FixSolidCull::split_bodies() {
         e.body = body;
         e.place = place;
       });
+  if (!sleeping()) return;
+  came_off.insert(bodies_.split_parents().begin(), bodies_.split_parents().end());
+  for (const int body : came_off)
+    if (bodies_.bodies().count(body)) find_frame(body);
 }
 
 void FixSolidCull::freeze_contacts() {
@@ -549,6 +630,7 @@ void FixSolidCull::freeze_contacts() {
       shell_[i].reference -= bodies_.pose(shell_[i].body).turned_to_frame(pair_force_.on_first(i, *j, history));
   };
   fresh_contacts_.clear();
+  fresh_histories_.clear();
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!shell_[i].locked) continue;
     const std::int64_t tag = atom->tag[i];
@@ -556,8 +638,7 @@ void FixSolidCull::freeze_contacts() {
       if (!freezes(tag, partner)) return;
       if (!contacts_.contains(tag, partner)) {
         contacts_.add(tag, partner, nullptr);
-        if (contacts_.width())
-          fresh_contacts_.push_back({tag, partner, std::vector<double>(history, history + contacts_.width())});
+        if (contacts_.width()) note_fresh(tag, partner, history);
       }
       rebase(i, partner, history);
     });
@@ -592,7 +673,7 @@ void FixSolidCull::freeze_inner_contacts() {
       const int other = j ? (shell_[*j].locked ? key_of(shell_[*j].body) : 0) : ghost ? *ghost : 0;
       if (other != own || contacts_.contains(tag, partner)) return;
       contacts_.add(tag, partner, nullptr);
-      fresh_contacts_.push_back({tag, partner, std::vector<double>(history, history + contacts_.width())});
+      note_fresh(tag, partner, history);
       for (const int* end : {static_cast<const int*>(&i), j})
         if (end && !shell_[*end].fresh && j)
           shell_[*end].reference -=
@@ -615,13 +696,22 @@ void FixSolidCull::share_bodies() {
     ghost_body_[static_cast<std::int64_t>(rows[r + 3])] = static_cast<int>(rows[r + 4]);
 }
 
+void FixSolidCull::note_fresh(std::int64_t tag, std::int64_t partner, const double* history) {
+  fresh_contacts_.push_back({tag, partner});
+  fresh_histories_.insert(fresh_histories_.end(), history, history + contacts_.width());
+}
+
 void FixSolidCull::freeze_histories() {
   // now that each granule has its body: vectors wait in the body's frame
-  for (FreshContact& c : fresh_contacts_) {
-    const int body = bodies_.body_of(c.tag) ? bodies_.body_of(c.tag) : bodies_.body_of(c.partner);
-    contacts_.turn(c.history.data(), bodies_.pose(body).turn().transpose());
-    contacts_.add(c.tag, c.partner, c.history.data());
+  const std::size_t width = contacts_.width();
+  double* history = fresh_histories_.data();
+  for (const auto& [tag, partner] : fresh_contacts_) {
+    const int body = bodies_.body_of(tag) ? bodies_.body_of(tag) : bodies_.body_of(partner);
+    contacts_.turn(history, bodies_.pose(body).turn().transpose());
+    contacts_.add(tag, partner, history);
+    history += width;
   }
+  fresh_histories_ = std::vector<double>();
   fresh_contacts_.clear();
 }
 
@@ -642,11 +732,17 @@ void FixSolidCull::thaw_contacts() {
   thawed_ = !freed_anywhere_.empty();
 }
 
-void FixSolidCull::store_what_is_deep() {
+/// Walls do not hinder it from going to the store: there are none, or they and its body stand still, and what they do to it is known.
+bool FixSolidCull::may_leave_its_walls(const ShellEntry& e) const {
+  if (!e.wall_near) return true;
+  return sleeping() && !e.moving_wall_near && stands_still(e.body) && e.came_back != update->ntimestep && !new_run_;
+}
+
+void FixSolidCull::store_what_is_deep(bool change) {
   std::int64_t highest = 0, highest_anywhere = 0;
   for (int i = 0; i < atom->nlocal; ++i) highest = std::max<std::int64_t>(highest, atom->tag[i]);
   MPI_Allreduce(&highest, &highest_anywhere, 1, MPI_INT64_T, MPI_MAX, world);
-  if (locked_now_.empty()) return;
+  if (locked_now_.empty() && !sleeping()) return;
 
   std::vector<Sphere> exterior;
   std::vector<Sphere> shells;
@@ -665,21 +761,66 @@ void FixSolidCull::store_what_is_deep() {
   cells.build(std::move(exterior), 2 * diameter_);
   shell_cells.build(std::move(shells), 2 * diameter_);
   const double gap = store_gap_in_skins * neighbor->skin;
+  // the largest body is everywhere: it asks whether it is near one of the others
+  struct Extent {
+    int key;
+    Vec3 lo, hi;
+  };
+  std::vector<Extent> others;
+  int largest = 0;
+  if (store_bodies_ > 1) {
+    std::size_t most = 0;
+    for (const auto& [number, body] : bodies_.bodies())
+      if (static_cast<std::size_t>(body.mass.count) > most) most = static_cast<std::size_t>(body.mass.count), largest = key_of(number);
+    store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
+      if (key_of(body) == largest) return;
+      const Pose& pose = bodies_.pose(body);
+      const Vec3 half = turned_half_box(pose.turn(), 0.5 * (hi - lo)) + Vec3::Constant(store_->largest_radius());
+      const Vec3 middle = pose.to_world(0.5 * (lo + hi));
+      others.push_back({key_of(body), middle - half, middle + half});
+    });
+  }
+  const bool images = halo_.image_shifts().size() > 1;
   const auto near_another_body = [&](int i) {
     if (store_bodies_ <= 1) return false;
     const int own = key_of(shell_[i].body);
     const Sphere s = sphere(i);
-    bool near = shell_cells.any_near(s, gap, [&](std::size_t other) { return shell_body[other] != own; });
-    if (!near)
-      for_each_stored_near(
-          s, gap, [&](const StoredGranule&) { near = true; }, own);
+    if (shell_cells.any_near(s, gap, [&](std::size_t other) { return shell_body[other] != own; })) return true;
+    const double reach = s.radius + gap;
+    if (own == largest && !images && std::none_of(others.begin(), others.end(), [&](const Extent& e) {
+          return (s.centre.array() > e.lo.array() - reach).all() && (s.centre.array() < e.hi.array() + reach).all();
+        }))
+      return false;
+    bool near = false;
+    for_each_stored_near(
+        s, gap, [&](const Resident&) { near = true; }, own);
     return near;
   };
+  std::vector<int> deep;
+  stay_near_ = 0;
   for (int i = atom->nlocal - 1; i >= 0; --i) {
     // the highest tag must stay an atom: new atoms are numbered from it
-    if (!shell_[i].locked || shell_[i].wall_near || atom->tag[i] == highest_anywhere) continue;
-    if (!cells.any_near(sphere(i), gap) && !near_another_body(i)) put_away(i);
+    if (!shell_[i].locked || !may_leave_its_walls(shell_[i]) || atom->tag[i] == highest_anywhere) continue;
+    if (!cells.any_near(sphere(i), gap) && !near_another_body(i))
+      deep.push_back(i);
+    else
+      ++stay_near_;
   }
+  // where nothing else changes, a few wait for more
+  if (!change && static_cast<double>(deep.size()) < store_share * atom->nlocal) return;
+  for (const int i : deep) put_away(i);
+  shell_changed_ = shell_changed_ || !deep.empty();
+}
+
+void FixSolidCull::fit_memory() {
+  memory_.fit();
+  pair_force_.release();
+  const auto empty = [](auto&... scratch) { ((scratch = {}), ...); };
+  empty(chosen_, side_changes_, normal_loads_, touches_, joins_, freed_, locked_now_, freed_anywhere_, locked_anywhere_, overdue_,
+        index_of_, locked_index_, locked_slot_, locked_place_, riding_, fresh_contacts_, around_);
+  shell_.resize(atom->nmax);
+  shell_.shrink_to_fit();
+  for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
 }
 
 void FixSolidCull::publish_atom_counts() {
@@ -689,10 +830,10 @@ void FixSolidCull::publish_atom_counts() {
   const std::int64_t before = stored_everywhere_;
   MPI_Allreduce(&stored, &stored_everywhere_, 1, MPI_INT64_T, MPI_SUM, world);
   if (output->thermo) engine::expect_atoms(*output->thermo, static_cast<long>(before - stored_everywhere_));
-  if (atom->map_style) {
+  if (map_cleared_) {
     atom->nghost = 0;
-    atom->map_init();
     atom->map_set();
+    map_cleared_ = false;
   }
   const double moved = static_cast<double>(freed_.size() + locked_now_.size());
   if (any_rank(moved > sort_share * atom->nlocal) && atom->sortfreq > 0) atom->nextsort = update->ntimestep;
@@ -737,7 +878,7 @@ void FixSolidCull::check_inserted() {
   for (int i = 0; i < atom->nlocal + atom->nghost; ++i) {
     if (atom->mask[i] & group->bitmask[interface_group_]) continue;
     const Sphere s = sphere(i);
-    for_each_stored_near(s, neighbor->skin, [&](const StoredGranule& g) {
+    for_each_stored_near(s, neighbor->skin, [&](const Resident& g) {
       near = true;
       if ((nearest_image(in_world(g), s.centre) - s.centre).norm() < g.radius + s.radius) overlapping = atom->tag[i];
     });

@@ -17,7 +17,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261123;  // first number of the state: the format's version
+constexpr double file_mark = 20261124;  // first number of the state: the format's version
 constexpr int header_size = 13;
 constexpr int no_record = -1;
 
@@ -87,22 +87,25 @@ std::vector<double> FixSolidCull::serialise(const std::vector<std::int64_t>& sto
   };
   FlatMap<char> named;
   Writer granules;
+  std::vector<double> record;
   for (const std::int64_t tag : stored) {
-    const StoredGranule& g = *store_->find(tag);
-    int length = 0;
-    const double* record = store_->record(tag, length);
-    for (const double x : {double(g.tag), g.mass, g.radius, double(index_of(g.body))}) granules.number(x);
+    const StoredGranule g = store_->get(tag);
+    store_->record(tag, record);
+    for (const double x : {double(g.tag), g.mass, g.radius, double(g.held), double(index_of(g.body))}) granules.number(x);
     granules.vector(g.position);
-    granules.number(length);
-    for (const double x : {double(g.type), double(g.layout), double(g.lock_step), g.normal_load}) granules.number(x);
+    granules.number(static_cast<double>(record.size()));
+    for (const double x : {double(g.type), double(g.layout), double(g.lock_step), g.normal_load, double(g.walls)})
+      granules.number(x);
     granules.vector(g.load_change);
-    granules.numbers(record, static_cast<std::size_t>(length));
+    granules.numbers(record.data(), record.size());
     named[tag] = 1;
   }
   for (const std::int64_t tag : atoms) {
     const int i = *index_of_.find(tag);
-    for (const double x : {double(tag), atom->rmass[i], atom->radius[i], double(index_of(shell_[i].body))}) granules.number(x);
-    granules.vector(shell_[i].place);
+    const ShellEntry& e = shell_[i];
+    for (const double x : {double(tag), atom->rmass[i], atom->radius[i], double(e.held), double(index_of(e.body))})
+      granules.number(x);
+    granules.vector(e.place);
     granules.number(no_record);
     named[tag] = 1;
   }
@@ -129,6 +132,7 @@ std::vector<double> FixSolidCull::serialise(const std::vector<std::int64_t>& sto
 struct FixSolidCull::Block {
   struct Granule {
     double mass, radius;
+    bool held;
     int body;
     Vec3 place;
     StoredGranule stored;
@@ -168,6 +172,7 @@ std::vector<FixSolidCull::Block> FixSolidCull::parse_blocks(const std::vector<do
       const std::int64_t tag = in.whole();
       g.mass = in.number();
       g.radius = in.number();
+      g.held = in.whole() != 0;
       g.body = static_cast<int>(in.whole());
       g.place = in.vector();
       g.length = static_cast<int>(in.whole());
@@ -181,6 +186,8 @@ std::vector<FixSolidCull::Block> FixSolidCull::parse_blocks(const std::vector<do
         s.layout = layout[static_cast<std::size_t>(in.whole())];
         s.lock_step = in.whole();
         s.normal_load = in.number();
+        s.walls = static_cast<int>(in.whole());
+        s.held = g.held;
         s.load_change = in.vector();
         g.record = in.numbers(static_cast<std::size_t>(g.length));
       }
@@ -228,6 +235,7 @@ void FixSolidCull::take_up_as_it_was(const Block& b) {
       StoredGranule s = g.stored;
       s.body = number[g.body];
       store_->add(s, g.record, g.length);
+      if (sleeping()) change_of_stored(s, +1);
       ledger_.stored(s);
       know_radius(s.type, s.radius);
     } else {
@@ -260,19 +268,25 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
         taken.emplace(tag, Taken{&b, &g});
     }
   fresh_contacts_.clear();
+  fresh_histories_.clear();
   const auto ours = [&](std::int64_t tag) { return taken.count(tag) || bodies_.body_of(tag); };
   for (const Block& b : blocks)
     for (const Block::Edge& e : b.edges) {
       if ((!ours(e.low) && !ours(e.high)) || contacts_.contains(e.low, e.high)) continue;
+      if (e.history.empty()) {
+        contacts_.add(e.low, e.high, nullptr);
+        continue;
+      }
+      std::vector<double> history = e.history;
+      contacts_.turn(history.data(), b.bodies[e.body].pose.turn());
       contacts_.add(e.low, e.high, nullptr);
-      if (e.history.empty()) continue;
-      fresh_contacts_.push_back({e.low, e.high, e.history});
-      contacts_.turn(fresh_contacts_.back().history.data(), b.bodies[e.body].pose.turn());
+      note_fresh(e.low, e.high, history.data());
     }
   for (const auto& [tag, t] : taken) {
     const SolidBody& from = t.block->bodies[t.granule->body];
     const Vec3 x = from.pose.to_world(t.granule->place);
-    const MovingGranule granule{t.granule->mass, t.granule->radius, x, from.twist.at(x), from.twist.spin};
+    const MovingGranule granule{t.granule->mass,      t.granule->radius, x, from.twist.at(x),
+                                from.twist.spin, t.granule->held};
     const SolidBodies::Place at = bodies_.lock(tag, granule, contacts_, [&](std::int64_t other) { return mass_of(other); });
     SolidBody& to = bodies_.body(at.body);
     if (!to.felt_known && from.felt_known) {
@@ -287,6 +301,7 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
       s.body = at.body;
       s.load_change = to.pose.turned_to_frame(from.pose.turned_to_world(s.load_change));
       store_->add(s, t.granule->record, t.granule->length);
+      if (sleeping()) change_of_stored(s, +1);
       ledger_.stored(s);
     } else if (i && shell_[*i].body == 0) {
       shell_[*i].body = at.body;
@@ -294,7 +309,7 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
       shell_[*i].reference = to.pose.turned_to_frame(shell_[*i].reference);
       shell_[*i].load_change = to.pose.turned_to_frame(shell_[*i].load_change);
     } else {
-      arriving_[tag] = {at, t.granule->mass, t.granule->radius};
+      arriving_[tag] = {at, t.granule->mass, t.granule->radius, t.granule->held};
     }
   }
   adopt_places();
@@ -336,12 +351,12 @@ void FixSolidCull::hand_over() {
   for (int i = 0; i < atom->nlocal; ++i)
     if (shell_[i].locked && !halo_.owns(vec(atom->x[i]))) atoms.push_back(atom->tag[i]);
   // a stored one may lag behind by store_slack(): bodies that have not moved by it since they were last looked through are left
-  store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
-    const Pose& pose = bodies_.pose(body);
-    const auto then = at_home_.find(body);
+  store_->for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
+    const Pose& pose = pose_of_frame(frame);
+    const auto then = at_home_.find(frame);
     if (then != at_home_.end() && largest_way(then->second, pose, lo, hi) < 0.5 * store_slack()) return;
-    at_home_[body] = pose;
-    store_->for_each_in_box(body, lo, hi, [&](const StoredGranule& g) {
+    at_home_[frame] = pose;
+    store_->for_each_in_box(frame, lo, hi, [&](const Resident& g) {
       if (!halo_.owns(in_world(g))) stored.push_back(g.tag);
     });
   });
@@ -359,12 +374,16 @@ void FixSolidCull::hand_over() {
   for (const std::int64_t tag : leaving) bodies_.unlock(tag, mass_of(tag), contacts_);
   for (const std::int64_t tag : atoms) shell_[*index_of_.find(tag)].body = -1;
   for (const std::int64_t tag : leaving) {
-    std::vector<FreshContact> kept;
+    struct Kept {
+      std::int64_t tag, partner;
+      std::vector<double> history;  // as tag sees it
+    };
+    std::vector<Kept> kept;
     contacts_.for_each(tag, [&](std::int64_t partner, const double* history) {
       if (bodies_.body_of(partner)) kept.push_back({partner, tag, history ? contacts_.turned(history) : std::vector<double>()});
     });
     contacts_.erase(tag);
-    for (const FreshContact& c : kept) contacts_.add(c.tag, c.partner, c.history.empty() ? nullptr : c.history.data());
+    for (const Kept& c : kept) contacts_.add(c.tag, c.partner, c.history.empty() ? nullptr : c.history.data());
   }
   split_bodies();
   std::vector<double> record;
@@ -397,7 +416,7 @@ double FixSolidCull::store_slack() const { return comm->nprocs > 1 && rigid() ? 
 
 void FixSolidCull::write_restart(FILE* file) {
   std::vector<std::int64_t> tags;
-  if (store_) store_->for_each([&](const StoredGranule& g) { tags.push_back(g.tag); });
+  if (store_) store_->for_each([&](const Resident& g) { tags.push_back(g.tag); });
   std::sort(tags.begin(), tags.end());
   std::vector<std::int64_t> atoms;
   index_of_.clear();

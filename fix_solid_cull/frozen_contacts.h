@@ -2,10 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "chunked_array.h"
 #include "flat_map.h"
 #include "sphere.h"
 
@@ -13,7 +15,8 @@ namespace solidcull {
 
 /// An undirected graph: nodes are granule tags, edges are contacts with a history of `width` numbers (may be 0).
 /// A history has a sense: component d changes its sign with the side it is seen from where flips[d] is true.
-/// Local to the rank; a contact across ranks stands in the graph of either rank.
+/// Tags are the engine's ints (else std::logic_error). Local to the rank; a contact across ranks stands in the graph of either
+/// rank. Memory: 16 bytes per edge, 8 width() for its history, 13 per node.
 class FrozenContacts {
  public:
   /// flips: one entry per history component, true for vector-like ones (the engine's "newton" flag of that component).
@@ -28,25 +31,22 @@ class FrozenContacts {
   /// Calls visit(partner, history as `tag` sees it or nullptr) for each contact of `tag`.
   template <class Visit>
   void for_each(std::int64_t tag, Visit visit) const {
-    std::vector<double> seen(width());
-    const int* head = heads_.find(tag);
-    for (int e = head ? *head : none; e != none; e = next(e, tag)) {
-      const Edge& edge = edges_[e];
-      visit(edge.low == tag ? edge.high : edge.low, read(e, tag, seen.data()));
-    }
+    Seen seen(width());
+    for (std::uint32_t e = first(tag); e != none; e = next(e, tag)) visit(other(e, tag), read(e, tag, seen.data()));
   }
   /// Partners only; cheaper.
   template <class Visit>
   void for_each_partner(std::int64_t tag, Visit visit) const {
-    const int* head = heads_.find(tag);
-    for (int e = head ? *head : none; e != none; e = next(e, tag)) visit(edges_[e].low == tag ? edges_[e].high : edges_[e].low);
+    for (std::uint32_t e = first(tag); e != none; e = next(e, tag)) visit(other(e, tag));
   }
   /// Every contact once: visit(low tag, high tag, history as the low tag sees it or nullptr).
   template <class Visit>
   void for_each_contact(Visit visit) const {
-    std::vector<double> seen(width());
-    for (std::size_t e = 0; e < edges_.size(); ++e)
-      if (edges_[e].low != free_mark) visit(edges_[e].low, edges_[e].high, read(static_cast<int>(e), edges_[e].low, seen.data()));
+    Seen seen(width());
+    for (std::uint32_t e = 0; e < edges_.size(); ++e) {
+      const std::int64_t low = edges_[e].low, high = edges_[e].high;
+      if (low != high) visit(low, high, read(e, low, seen.data()));
+    }
   }
 
   /// The same history as seen from the other side.
@@ -70,10 +70,9 @@ class FrozenContacts {
   /// Turns the histories of the contacts of `tag` with partners for which mine(partner) holds.
   template <class Mine>
   void turn(std::int64_t tag, const Eigen::Matrix3d& by, Mine mine) {
-    const int* head = heads_.find(tag);
-    for (int e = head ? *head : none; e != none; e = next(e, tag))
-      if (edges_[e].has_history && mine(edges_[e].low == tag ? edges_[e].high : edges_[e].low))
-        turn(histories_.data() + static_cast<std::size_t>(e) * width(), by);
+    if (vectors_.empty()) return;
+    for (std::uint32_t e = first(tag); e != none; e = next(e, tag))
+      if (edges_[e].has_history && mine(other(e, tag))) turn(histories_.row(e), by);
   }
   /// Removes all contacts of `tag`.
   void erase(std::int64_t tag);
@@ -81,27 +80,49 @@ class FrozenContacts {
   std::size_t memory_bytes() const;
 
  private:
-  static constexpr int none = -1;
-  static constexpr std::int64_t free_mark = INT64_MIN;
+  static constexpr std::uint32_t none = 0x7fffffff;
   struct Edge {
-    std::int64_t low, high;   // tags, low < high
-    int next_low, next_high;  // the next edge in the list of either end
-    bool has_history;
+    std::int32_t low, high;        // tags, low < high; equal where the place is free
+    std::uint32_t next_low;        // the next edge in the list of the low tag, or the next free place
+    std::uint32_t next_high : 31;  // likewise of the high tag
+    std::uint32_t has_history : 1;
+  };
+  /// Room for one history, off the heap for the widths that occur.
+  class Seen {
+   public:
+    explicit Seen(std::size_t width) : wide_(width > few_.size() ? width : 0) {}
+    double* data() { return wide_.empty() ? few_.data() : wide_.data(); }
+
+   private:
+    std::array<double, 32> few_;
+    std::vector<double> wide_;
   };
 
-  int next(int e, std::int64_t tag) const { return edges_[e].low == tag ? edges_[e].next_low : edges_[e].next_high; }
-  int& next(int e, std::int64_t tag) { return edges_[e].low == tag ? edges_[e].next_low : edges_[e].next_high; }
-  int find(std::int64_t tag, std::int64_t partner) const;
-  void unlink(int e, std::int64_t tag);
-  const double* read(int e, std::int64_t tag, double* out) const;
-  void write(int e, std::int64_t tag, const double* history);
+  std::uint32_t first(std::int64_t tag) const {
+    const std::uint32_t* head = heads_.find(narrow_tag(tag));
+    return head ? *head : none;
+  }
+  std::int64_t other(std::uint32_t e, std::int64_t tag) const { return edges_[e].low == tag ? edges_[e].high : edges_[e].low; }
+  std::uint32_t next(std::uint32_t e, std::int64_t tag) const {
+    return edges_[e].low == tag ? edges_[e].next_low : edges_[e].next_high;
+  }
+  void set_next(std::uint32_t e, std::int64_t tag, std::uint32_t next) {
+    if (edges_[e].low == tag)
+      edges_[e].next_low = next;
+    else
+      edges_[e].next_high = next & none;
+  }
+  std::uint32_t find(std::int64_t tag, std::int64_t partner) const;
+  void unlink(std::uint32_t e, std::int64_t tag);
+  const double* read(std::uint32_t e, std::int64_t tag, double* out) const;
+  void write(std::uint32_t e, std::int64_t tag, const double* history);
 
   std::vector<bool> flips_;
   std::vector<int> vectors_;
-  std::vector<Edge> edges_;
-  std::vector<double> histories_;  // width() per edge, as the low tag sees it
-  std::vector<int> free_;
-  FlatMap<int> heads_;
+  ChunkedArray<Edge> edges_;
+  ChunkedArray<double> histories_{0};  // a row for each edge, as the low tag sees it
+  std::uint32_t first_free_ = none;
+  FlatMap<std::uint32_t, std::int32_t> heads_;
   std::size_t count_ = 0;
 };
 

@@ -1,6 +1,7 @@
 #include "granule_records.h"
 
 #include <algorithm>
+#include <cstring>
 #include <sstream>
 
 #include "atom.h"
@@ -36,20 +37,67 @@ int GranuleRecords::number_of(const Layout& layout) {
 void GranuleRecords::pack(int i, std::vector<double>& record, int& layout) {
   scratch_.resize(longest_column);
   record.clear();
-  Layout columns;
-  const auto keep = [&](const std::string& fix, int length) {
-    columns.push_back({fix, length});
+  lengths_.clear();
+  const auto keep = [&](int length) {
+    lengths_.push_back(length);
     record.insert(record.end(), scratch_.begin(), scratch_.begin() + length);
   };
   {
     AtomStyleOnly guard(atom);
-    keep("", atom->avec->pack_exchange(i, scratch_.data()));
+    keep(atom->avec->pack_exchange(i, scratch_.data()));
   }
   for (int e = 0; e < atom->nextra_grow; ++e) {
     LAMMPS_NS::Fix* fix = modify->fix[atom->extra_grow[e]];
-    if (fix != own_) keep(fix->id, fix->pack_exchange(i, scratch_.data()));
+    if (fix != own_) keep(fix->pack_exchange(i, scratch_.data()));
   }
-  layout = number_of(columns);
+  layout = last_layout_;
+  if (!is_last_layout()) {
+    Layout columns = {{"", lengths_[0]}};
+    std::size_t column = 1;
+    for (int e = 0; e < atom->nextra_grow; ++e) {
+      LAMMPS_NS::Fix* fix = modify->fix[atom->extra_grow[e]];
+      if (fix != own_) columns.push_back({fix->id, lengths_[column++]});
+    }
+    layout = last_layout_ = number_of(columns);
+  }
+}
+
+/// Most granules have the columns of the one before.
+bool GranuleRecords::is_last_layout() const {
+  if (last_layout_ < 0) return false;
+  const Layout& last = layouts_[last_layout_];
+  if (last.size() != lengths_.size() || last[0].length != lengths_[0]) return false;
+  std::size_t column = 1;
+  for (int e = 0; e < atom->nextra_grow; ++e) {
+    const LAMMPS_NS::Fix* fix = modify->fix[atom->extra_grow[e]];
+    if (fix == own_) continue;
+    if (last[column].length != lengths_[column] || last[column].fix != fix->id) return false;
+    ++column;
+  }
+  return true;
+}
+
+std::vector<int> GranuleRecords::motion_words(int i, bool positions) {
+  std::vector<double> before(longest_column), after(longest_column);
+  AtomStyleOnly guard(atom);
+  const int length = atom->avec->pack_exchange(i, before.data());
+  std::vector<double*> state;
+  for (int d = 0; d < 3; ++d) {
+    if (positions) state.push_back(&atom->x[i][d]);
+    state.push_back(&atom->v[i][d]);
+    state.push_back(&atom->omega[i][d]);
+  }
+  std::vector<int> words;
+  for (double* number : state) {
+    const double kept = *number;
+    *number = kept + 1;
+    atom->avec->pack_exchange(i, after.data());
+    *number = kept;
+    for (int w = 0; w < length; ++w)
+      if (std::memcmp(&before[w], &after[w], sizeof(double)) != 0) words.push_back(w);
+  }
+  std::sort(words.begin(), words.end());
+  return words;
 }
 
 void GranuleRecords::remove(int i) {

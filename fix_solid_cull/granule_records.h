@@ -18,6 +18,8 @@ class GranuleRecords : protected LAMMPS_NS::Pointers {
 
   /// Packs owned granule i; `layout` receives the number of its column layout.
   void pack(int i, std::vector<double>& record, int& layout);
+  /// Which numbers of a record are position, velocity and spin (position only where `positions`), by trying them on owned granule i.
+  std::vector<int> motion_words(int i, bool positions);
   /// Deletes owned granule i; the last owned granule takes its index.
   void remove(int i);
   /// Appends a granule from its record and returns its index. Fixes that were not there when it was packed set their defaults.
@@ -36,9 +38,12 @@ class GranuleRecords : protected LAMMPS_NS::Pointers {
   };
   using Layout = std::vector<Column>;
   int number_of(const Layout& layout);
+  bool is_last_layout() const;
 
   const LAMMPS_NS::Fix* own_;
   std::vector<Layout> layouts_;
+  int last_layout_ = -1;
+  std::vector<int> lengths_;
   std::vector<double> scratch_;
 };
 

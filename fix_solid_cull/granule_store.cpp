@@ -1,130 +1,384 @@
 #include "granule_store.h"
 
 #include <algorithm>
+#include <cstring>
 #include <stdexcept>
 #include <string>
 
-#include "exact_sum.h"
-
 namespace solidcull {
+namespace {
+
+constexpr std::uint32_t empty_entry = UINT32_MAX;
+
+/// A granule's row: what is below, then its engine record. Tag, radius and mass come first, as key words.
+constexpr int record_begin = 10;
+
+std::uint64_t bits_of(double x) {
+  std::uint64_t word;
+  std::memcpy(&word, &x, sizeof word);
+  return word;
+}
+double number_of(std::uint64_t word) {
+  double x;
+  std::memcpy(&x, &word, sizeof x);
+  return x;
+}
+/// Two ints in one word.
+std::uint64_t pair_of(int low, int high) {
+  return static_cast<std::uint64_t>(static_cast<std::uint32_t>(high)) << 32 | static_cast<std::uint32_t>(low);
+}
+
+std::uint64_t tag_word(std::int64_t tag) { return bits_of(static_cast<double>(tag)); }
+
+std::array<std::uint64_t, record_begin> head_of_row(const StoredGranule& g) {
+  return {tag_word(g.tag),
+          bits_of(g.radius),
+          bits_of(g.mass),
+          pair_of(g.type, g.layout),
+          static_cast<std::uint64_t>(g.lock_step),
+          bits_of(g.normal_load),
+          bits_of(g.load_change[0]),
+          bits_of(g.load_change[1]),
+          bits_of(g.load_change[2]),
+          pair_of(g.walls, g.held)};
+}
+
+}  // namespace
 
 GranuleStore::GranuleStore(double cell) : inverse_cell_(1.0 / cell) {
   if (!(cell > 0) || !std::isfinite(cell)) throw std::invalid_argument("granule store: the cell size must be positive");
 }
 
-void GranuleStore::count_around(Grid& grid, const std::array<std::int64_t, 3>& c, int change) {
-  for (std::int64_t i = c[0] - 1; i <= c[0] + 1; ++i)
-    for (std::int64_t j = c[1] - 1; j <= c[1] + 1; ++j)
-      for (std::int64_t k = c[2] - 1; k <= c[2] + 1; ++k) {
-        Cell& cell = grid.cells[key(i, j, k)];
-        cell.count_around += change;
-        if (cell.count_around == 0) grid.cells.erase(key(i, j, k));
-      }
-}
+// ------------------------------------------------------------------------------------------------------------------ in and out
 
-void GranuleStore::link(int s) {
-  const StoredGranule& granule = slots_[s].granule;
-  Grid& grid = grids_[granule.body];
-  const auto c = cell_of(granule.position);
-  count_around(grid, c, +1);
-  Cell& cell = grid.cells[key(c[0], c[1], c[2])];
-  slots_[s].next = cell.head;
-  cell.head = s;
-  ++cell.count_here;
-  ++grid.granules;
-  grid.lo = grid.lo.cwiseMin(granule.position);
-  grid.hi = grid.hi.cwiseMax(granule.position);
-}
+void GranuleStore::add(const StoredGranule& granule, const double* record, int length, const std::vector<int>& transient) {
+  const std::int32_t tag = narrow_tag(granule.tag);
+  if (contains(tag)) throw std::logic_error("granule " + std::to_string(tag) + " went into the store twice");
+  for (const int i : transient)
+    if (i < 0 || i >= length)
+      throw std::logic_error("a record of " + std::to_string(length) + " has no word " + std::to_string(i));
 
-void GranuleStore::unlink(int s) {
-  const StoredGranule& granule = slots_[s].granule;
-  const auto grid = grids_.find(granule.body);
-  const auto c = cell_of(granule.position);
-  Cell& cell = *grid->second.cells.find(key(c[0], c[1], c[2]));
-  int* link = &cell.head;
-  while (*link != s) link = &slots_[*link].next;
-  *link = slots_[s].next;
-  --cell.count_here;
-  count_around(grid->second, c, -1);
-  if (--grid->second.granules == 0) grids_.erase(grid);
-}
-
-void GranuleStore::move(std::int64_t tag, int body, const Vec3& position) {
-  const int* s = slot_of_.find(tag);
-  if (!s) throw std::logic_error("granule " + std::to_string(tag) + " is not in the store");
-  unlink(*s);
-  slots_[*s].granule.body = body;
-  slots_[*s].granule.position = position;
-  link(*s);
-}
-
-void GranuleStore::add(const StoredGranule& granule, const double* record, int length) {
-  if (slot_of_.contains(granule.tag))
-    throw std::logic_error("granule " + std::to_string(granule.tag) + " went into the store twice");
   int s = first_free_;
-  if (s == none) {
-    s = static_cast<int>(slots_.size());
-    slots_.emplace_back();
-  } else {
+  if (s == none)
+    s = static_cast<int>(slots_.append());
+  else
     first_free_ = slots_[s].next;
-  }
-  if (static_cast<std::size_t>(length) >= pools_.size()) pools_.resize(length + 1);
-  Pool& pool = pools_[length];
-  std::size_t offset = pool.data.size();
-  if (pool.free.empty()) {
-    pool.data.insert(pool.data.end(), record, record + length);
-  } else {
-    offset = pool.free.back();
-    pool.free.pop_back();
-    std::copy(record, record + length, pool.data.begin() + static_cast<std::ptrdiff_t>(offset));
+
+  const auto head = head_of_row(granule);
+  std::vector<std::uint64_t>& row = scratch_;
+  row.resize(record_begin + static_cast<std::size_t>(length));
+  std::copy(head.begin(), head.end(), row.begin());
+  if (length) std::memcpy(row.data() + record_begin, record, static_cast<std::size_t>(length) * sizeof(double));
+  if (!transient.empty()) {
+    auto& lists = transient_.indices;
+    auto list = std::find(lists.begin(), lists.end(), transient);
+    if (list == lists.end()) list = lists.insert(list, transient);
+    transient_.of_tag[tag] = {transient_.words.size(), static_cast<std::uint32_t>(list - lists.begin())};
+    for (const int i : transient) {
+      transient_.words[transient_.words.append()] = record[i];
+      row[record_begin + i] = 0;
+    }
   }
 
-  slots_[s] = {granule, offset, length, none};
-  link(s);
-  slot_of_[granule.tag] = s;
+  Slot& slot = slots_[s];
+  set_position(s, granule.position);
+  slot.tag = tag;
+  slot.body = granule.body;
+  slot.row = rows_.put(row.data(), static_cast<int>(row.size()));
+  join(granule.body, granule.position);
+  seat(s, frame_of(granule.body));
+  ++size_;
+  index(s);
+  mass_ += granule.mass;
   largest_radius_ = std::max(largest_radius_, granule.radius);
 }
 
 StoredGranule GranuleStore::take(std::int64_t tag, std::vector<double>& record) {
-  const int* found = slot_of_.find(tag);
-  if (!found) throw std::logic_error("granule " + std::to_string(tag) + " is not in the store");
-  const int s = *found;
-  Slot& slot = slots_[s];
-  Pool& pool = pools_[slot.length];
-  const auto from = pool.data.begin() + static_cast<std::ptrdiff_t>(slot.offset);
-  record.assign(from, from + slot.length);
-  pool.free.push_back(slot.offset);
-
-  unlink(s);
-
-  slot_of_.erase(tag);
-  slot.next = first_free_;
+  const int s = slot_or_throw(tag);
+  const StoredGranule g = granule(s);
+  read_record(s, record);
+  transient_.of_tag.erase(slots_[s].tag);
+  unindex(slots_[s].tag);
+  unseat(s, frame_of(g.body));
+  leave(g.body);
+  rows_.drop(slots_[s].row);
+  slots_[s].tag = free_mark;
+  slots_[s].next = first_free_;
   first_free_ = s;
-  return slot.granule;
+  mass_ -= g.mass;
+  if (--size_ == 0) mass_ = ExactSum();
+  return g;
 }
 
-const StoredGranule* GranuleStore::find(std::int64_t tag) const {
-  const int* s = slot_of_.find(tag);
-  return s ? &slots_[*s].granule : nullptr;
+Resident GranuleStore::resident(int s) const {
+  return {position(s), number_of(rows_.word_1(slots_[s].row)), slots_[s].tag, slots_[s].body};
 }
 
-const double* GranuleStore::record(std::int64_t tag, int& length) const {
-  const int* s = slot_of_.find(tag);
-  if (!s) throw std::logic_error("granule " + std::to_string(tag) + " is not in the store");
-  length = slots_[*s].length;
-  return pools_[length].data.data() + slots_[*s].offset;
+StoredGranule GranuleStore::granule(int s) const {
+  std::uint64_t row[record_begin];
+  row[0] = tag_word(slots_[s].tag);
+  rows_.get(slots_[s].row, row, record_begin);
+  StoredGranule g;
+  g.position = position(s);
+  g.radius = number_of(row[1]);
+  g.mass = number_of(row[2]);
+  g.tag = slots_[s].tag;
+  g.type = static_cast<int>(row[3] & UINT32_MAX);
+  g.body = slots_[s].body;
+  g.layout = static_cast<int>(row[3] >> 32);
+  g.lock_step = static_cast<std::int64_t>(row[4]);
+  g.normal_load = number_of(row[5]);
+  g.load_change = Vec3(number_of(row[6]), number_of(row[7]), number_of(row[8]));
+  g.walls = static_cast<int>(row[9] & UINT32_MAX);
+  g.held = row[9] >> 32 != 0;
+  return g;
 }
 
-double GranuleStore::mass() const {
+void GranuleStore::read_record(int s, std::vector<double>& out) const {
+  const int length = rows_.length(slots_[s].row);
+  std::vector<std::uint64_t> row(static_cast<std::size_t>(length));
+  row[0] = tag_word(slots_[s].tag);
+  rows_.get(slots_[s].row, row.data(), length);
+  out.resize(row.size() - record_begin);
+  if (!out.empty()) std::memcpy(out.data(), row.data() + record_begin, out.size() * sizeof(double));
+  if (const auto* known = transient_.of_tag.find(slots_[s].tag)) {
+    std::size_t word = known->first;
+    for (const int i : transient_.indices[known->indices]) out[i] = transient_.words[word++];
+  }
+}
+
+/// Keeps what has changed but for place and body.
+void GranuleStore::change(int s, const StoredGranule& before, const StoredGranule& after) {
+  const auto head = head_of_row(after);
+  if (head == head_of_row(before)) return;
+  const PackedRows::Place old = slots_[s].row;
+  std::vector<std::uint64_t> row(static_cast<std::size_t>(rows_.length(old)));
+  row[0] = head[0];
+  rows_.get(old, row.data(), static_cast<int>(row.size()));
+  std::copy(head.begin() + 1, head.end(), row.begin() + 1);
+  rows_.drop(old);
+  slots_[s].row = rows_.put(row.data(), static_cast<int>(row.size()));
+  mass_ -= before.mass;
+  mass_ += after.mass;
+}
+
+std::optional<Resident> GranuleStore::find(std::int64_t tag) const {
+  const int s = slot_of(tag);
+  if (s == none) return std::nullopt;
+  return resident(s);
+}
+
+StoredGranule GranuleStore::get(std::int64_t tag) const { return granule(slot_or_throw(tag)); }
+
+void GranuleStore::record(std::int64_t tag, std::vector<double>& out) const { read_record(slot_or_throw(tag), out); }
+
+bool GranuleStore::transient_known(std::int64_t tag) const { return transient_.of_tag.contains(narrow_tag(tag)); }
+
+// --------------------------------------------------------------------------------------------------------- bodies and grids
+
+int GranuleStore::frame_of(int body) const {
+  const auto found = bodies_.find(body);
+  return found != bodies_.end() && found->second.shared ? shared_frame : body;
+}
+
+std::vector<int> GranuleStore::slots_of(int body) const {
+  std::vector<int> slots;
+  for_each_slot_of(body, [&](int s) { slots.push_back(s); });
+  return slots;
+}
+
+void GranuleStore::seat(int s, int frame) {
+  Grid& grid = grids_[frame];
+  const auto c = cell_of(position(s));
+  Cell* cell = grid.cells.find(key(c[0], c[1], c[2]));
+  if (!cell || cell->head == none) {
+    for (std::int64_t i = c[0] - 1; i <= c[0] + 1; ++i)
+      for (std::int64_t j = c[1] - 1; j <= c[1] + 1; ++j)
+        for (std::int64_t k = c[2] - 1; k <= c[2] + 1; ++k) ++grid.cells[key(i, j, k)].around;
+    cell = grid.cells.find(key(c[0], c[1], c[2]));
+  }
+  slots_[s].next = cell->head;
+  cell->head = s;
+  ++grid.granules;
+  grid.box.enclose(position(s));
+}
+
+void GranuleStore::unseat(int s, int frame) {
+  const auto found = grids_.find(frame);
+  Grid& grid = found->second;
+  const auto c = cell_of(position(s));
+  Cell& cell = *grid.cells.find(key(c[0], c[1], c[2]));
+  if (cell.head == s) {
+    cell.head = slots_[s].next;
+  } else {
+    int before = cell.head;
+    while (slots_[before].next != s) before = slots_[before].next;
+    slots_[before].next = slots_[s].next;
+  }
+  if (--grid.granules == 0) {
+    grids_.erase(found);
+    return;
+  }
+  if (cell.head != none) return;
+  for (std::int64_t i = c[0] - 1; i <= c[0] + 1; ++i)
+    for (std::int64_t j = c[1] - 1; j <= c[1] + 1; ++j)
+      for (std::int64_t k = c[2] - 1; k <= c[2] + 1; ++k)
+        if (--grid.cells.find(key(i, j, k))->around == 0) grid.cells.erase(key(i, j, k));
+}
+
+void GranuleStore::join(int body, const Vec3& position) {
+  Body& b = bodies_[body];
+  ++b.granules;
+  b.box.enclose(position);
+}
+
+void GranuleStore::leave(int body) {
+  const auto found = bodies_.find(body);
+  if (--found->second.granules != 0) return;
+  if (found->second.remembered)
+    found->second.box = Box();
+  else
+    bodies_.erase(found);
+}
+
+void GranuleStore::relocate(int s, int body, const Vec3& to) {
+  Slot& slot = slots_[s];
+  const int from = slot.body;
+  const int old_frame = frame_of(from), new_frame = frame_of(body);
+  const bool same_cell = old_frame == new_frame && cell_of(position(s)) == cell_of(to);
+  if (!same_cell) unseat(s, old_frame);
+  slot.body = body;
+  set_position(s, to);
+  if (same_cell)
+    grids_.find(new_frame)->second.box.enclose(to);
+  else
+    seat(s, new_frame);
+  join(body, to);  // before it leaves: a body that it leaves for itself must not be forgotten
+  leave(from);
+}
+
+void GranuleStore::move(std::int64_t tag, int body, const Vec3& position) { relocate(slot_or_throw(tag), body, position); }
+
+void GranuleStore::share(int body, bool on) {
+  const int from = frame_of(body);
+  Body& b = bodies_[body];
+  b.shared = b.remembered = on;
+  if (b.granules == 0) {
+    if (!on) bodies_.erase(body);
+    return;
+  }
+  const int to = frame_of(body);
+  if (from == to) return;
+  if (grids_.at(from).granules == b.granules && !grids_.count(to)) {  // the whole grid
+    auto grid = grids_.extract(from);
+    grid.key() = to;
+    grids_.insert(std::move(grid));
+    return;
+  }
+  b.shared = !on;
+  const std::vector<int> slots = slots_of(body);
+  b.shared = on;
+  for (const int s : slots) {
+    unseat(s, from);
+    seat(s, to);
+  }
+}
+
+void GranuleStore::forget(int body) {
+  const auto found = bodies_.find(body);
+  if (found == bodies_.end()) return;
+  found->second.remembered = false;
+  if (found->second.granules == 0) bodies_.erase(found);
+}
+
+// ----------------------------------------------------------------------------------------------------------- the table of tags
+
+/// The entry of the tag, or the empty one where it would go.
+std::size_t GranuleStore::index_place(std::int32_t tag) const {
+  const std::uint64_t hash = scrambled(static_cast<std::uint64_t>(tag));
+  const std::uint32_t slot_mask = (std::uint32_t{1} << slot_bits_) - 1, mark = static_cast<std::uint32_t>(hash) & ~slot_mask;
+  std::size_t at = slot_of_hash(hash, index_.size());
+  while (index_[at] != empty_entry && ((index_[at] & ~slot_mask) != mark || slots_[index_[at] & slot_mask].tag != tag))
+    at = at + 1 == index_.size() ? 0 : at + 1;
+  return at;
+}
+
+int GranuleStore::slot_of(std::int64_t tag) const {
+  if (size_ == 0) return none;
+  const std::uint32_t entry = index_[index_place(narrow_tag(tag))];
+  return entry == empty_entry ? none : static_cast<int>(entry & ((std::uint32_t{1} << slot_bits_) - 1));
+}
+
+int GranuleStore::slot_or_throw(std::int64_t tag) const {
+  const int s = slot_of(tag);
+  if (s == none) throw std::logic_error("granule " + std::to_string(tag) + " is not in the store");
+  return s;
+}
+
+/// The slot is in the table from here on; it has its tag.
+void GranuleStore::index(int s) {
+  if (5 * size_ > 4 * index_.size()) {
+    rebuild_index(std::max<std::size_t>(16, index_.size() + index_.size() / 4));
+    return;
+  }
+  const std::uint64_t hash = scrambled(static_cast<std::uint64_t>(slots_[s].tag));
+  const std::uint32_t slot_mask = (std::uint32_t{1} << slot_bits_) - 1;
+  std::size_t at = slot_of_hash(hash, index_.size());
+  while (index_[at] != empty_entry) at = at + 1 == index_.size() ? 0 : at + 1;
+  index_[at] = (static_cast<std::uint32_t>(hash) & ~slot_mask) | static_cast<std::uint32_t>(s);
+}
+
+void GranuleStore::unindex(std::int32_t tag) {
+  const std::size_t n = index_.size();
+  const std::uint32_t slot_mask = (std::uint32_t{1} << slot_bits_) - 1;
+  const auto distance = [n](std::size_t from, std::size_t to) { return to >= from ? to - from : to + n - from; };
+  std::size_t hole = index_place(tag);
+  for (std::size_t at = hole;;) {
+    at = at + 1 == n ? 0 : at + 1;
+    if (index_[at] == empty_entry) break;
+    const std::int32_t other = slots_[index_[at] & slot_mask].tag;
+    if (distance(slot_of_hash(scrambled(static_cast<std::uint64_t>(other)), n), at) < distance(hole, at)) continue;
+    index_[hole] = index_[at];
+    hole = at;
+  }
+  index_[hole] = empty_entry;
+}
+
+/// With all slots that hold a granule. New slots come only while all are taken, so none gets a number above `most` before the
+/// table grows again.
+void GranuleStore::rebuild_index(std::size_t entries) {
+  const std::size_t most = std::max(entries, slots_.size()) + 1;
+  slot_bits_ = 0;
+  while (most >> slot_bits_) ++slot_bits_;
+  if (slot_bits_ > 31) throw std::logic_error("the granule store of one rank is full");
+  index_.assign(entries, empty_entry);
+  index_.shrink_to_fit();
+  const std::size_t n = index_.size();
+  const std::uint32_t slot_mask = (std::uint32_t{1} << slot_bits_) - 1;
+  for (std::size_t s = 0; s < slots_.size(); ++s) {
+    if (slots_[s].tag == free_mark) continue;
+    const std::uint64_t hash = scrambled(static_cast<std::uint64_t>(slots_[s].tag));
+    std::size_t at = slot_of_hash(hash, n);
+    while (index_[at] != empty_entry) at = at + 1 == n ? 0 : at + 1;
+    index_[at] = (static_cast<std::uint32_t>(hash) & ~slot_mask) | static_cast<std::uint32_t>(s);
+  }
+}
+
+// -------------------------------------------------------------------------------------------------------------------- figures
+
+double GranuleStore::mass_recounted() const {
   ExactSum sum;
-  for_each([&](const StoredGranule& g) { sum += g.mass; });
+  for (std::size_t s = 0; s < slots_.size(); ++s)
+    if (slots_[s].tag != free_mark) sum += granule(static_cast<int>(s)).mass;
   return sum.value();
 }
 
 std::size_t GranuleStore::memory_bytes() const {
-  std::size_t bytes = slots_.capacity() * sizeof(Slot) + slot_of_.memory_bytes();
-  for (const auto& grid : grids_) bytes += sizeof(Grid) + grid.second.cells.memory_bytes();
-  for (const Pool& p : pools_) bytes += p.data.capacity() * sizeof(double) + p.free.capacity() * sizeof(std::size_t);
+  constexpr std::size_t node = 4 * sizeof(void*);  // of a std::map, besides what it holds
+  std::size_t bytes = slots_.memory_bytes() + rows_.memory_bytes() + index_.capacity() * sizeof(index_[0]) +
+                      transient_.of_tag.memory_bytes() + transient_.words.memory_bytes();
+  bytes += bodies_.size() * (sizeof(std::pair<const int, Body>) + node);
+  for (const auto& grid : grids_) bytes += sizeof(grid) + node + grid.second.cells.memory_bytes();
   return bytes;
 }
 

@@ -20,6 +20,9 @@ class PairForce : protected LAMMPS_NS::Pointers {
   /// Force (N) on owned atom i by owned atom j with this contact history (nullptr: none); valid wherever both are atoms.
   Vec3 on_first(int i, int j, const double* history);
 
+  /// Gives its scratch memory back.
+  void release();
+
  private:
   Vec3 compute(int i, int neighbour, int flag, std::vector<double> history);
 

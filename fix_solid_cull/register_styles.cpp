@@ -1,6 +1,6 @@
 // Makes the two styles known to an unmodified LIGGGHTS. Fix styles stand in a table; region styles in an if-chain, so the
 // engine's own Domain::add_region is interposed: this library comes before libliggghts.so in the search for symbols, and asks for
-// the next.
+// the next. So is the call by which a wall tells its mesh of a contact: loads of granules that are put away must be known.
 #include <dlfcn.h>
 
 #include <cstring>
@@ -9,9 +9,11 @@
 #include "domain.h"
 #include "engine_access.h"
 #include "error.h"
+#include "fix_mesh_surface.h"
 #include "fix_solid_cull.h"
 #include "lammps.h"
 #include "memory.h"
+#include "mesh_loads.h"
 #include "modify.h"
 #include "region_interface_mesh.h"
 #include "solidcull.h"
@@ -57,6 +59,13 @@ void Domain::add_region(int narg, char** arg) {
     add_interface_mesh(lmp, narg, arg);
   else
     original(this, narg, arg);
+}
+
+void FixMeshSurface::add_particle_contribution(int ip, double* frc, double* delta, int iTri, double* v_wall) {
+  using Original = void (*)(FixMeshSurface*, int, double*, double*, int, double*);
+  static const auto original = next_symbol<Original>("_ZN9LAMMPS_NS14FixMeshSurface25add_particle_contributionEiPdS1_iS1_");
+  solidcull::MeshLoads::contact(this, ip, frc, delta, iTri);
+  original(this, ip, frc, delta, iTri, v_wall);
 }
 
 }  // namespace LAMMPS_NS

@@ -46,6 +46,8 @@ class RigidMotion {
   /// second order, which keeps the angular momentum to the last bit. Returns what was done to space.
   RigidStep drift(double dt);
   void shift(const Vec3& by) { centre_ += by; }
+  /// What holds it takes its momentum.
+  void stop() { velocity_ = angular_momentum_ = Vec3::Zero(); }
 
   /// Calls visit(number) with a reference to each number of the state, in one order: to write it to a file and to read it back.
   template <class Visit>

@@ -66,10 +66,11 @@ const std::map<std::string, Reader>& readers() {
   static const std::map<std::string, Reader> table = {
       {"every", [](Values& v, Settings& s) { s.every = v.whole("a whole number of steps, 1 or more", 1); }},
       {"depth", [](Values& v,
-                   Settings& s) { s.depth = v.number("a number of mean diameters, more than 0 and at most 50", 0, false, 50); }},
+                   Settings& s) { s.depth = v.number("a number of mean diameters, 0 to 50", 0, true, 50); }},
       {"exterior",
        [](Values& v, Settings& s) {
-         v.one_of("'live'", {{"live", [&] { s.exterior = Exterior::live; }}});
+         v.one_of("'live' or 'sleep'",
+                  {{"live", [&] { s.exterior = Exterior::live; }}, {"sleep", [&] { s.exterior = Exterior::sleep; }}});
        }},
       {"speed", [](Values& v, Settings& s) { s.speed = v.number("a fraction of sqrt(g d), more than 0", 0, false); }},
       {"calm", [](Values& v, Settings& s) { s.calm = v.whole("a whole number of looks, 1 or more", 1); }},
@@ -130,6 +131,7 @@ std::vector<std::string> setting_keywords() {
 
 Settings parse_settings(const std::vector<std::string>& words) {
   Settings s;
+  s.depth = -1;
   for (std::size_t at = 0; at < words.size();) {
     const auto reader = readers().find(words[at]);
     if (reader == readers().end()) {
@@ -141,7 +143,11 @@ Settings parse_settings(const std::vector<std::string>& words) {
     reader->second(values, s);
     at = values.end();
   }
-  if (2 * s.voxel > s.depth) {
+  if (s.depth < 0) s.depth = s.exterior == Exterior::live ? 2.0 : 0.0;
+  if (s.exterior == Exterior::live && s.depth == 0)
+    throw InputError("keyword 'depth' has the value '0' and 'exterior' the value 'live': give a cover of more than 0, or say "
+                     "'exterior sleep'");
+  if (s.exterior == Exterior::live && 2 * s.voxel > s.depth) {
     const auto text = [](double x) {
       std::string t = std::to_string(x);
       return t.substr(0, t.find_last_not_of('0') + 1 + (t.find('.') == t.find_last_not_of('0') ? 1 : 0));

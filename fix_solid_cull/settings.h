@@ -6,7 +6,7 @@
 
 namespace solidcull {
 
-enum class Exterior { live };
+enum class Exterior { live, sleep };
 enum class Motion { rigid, fixed };
 enum class Walls { closed, surface };
 enum class Store { exact };
@@ -20,7 +20,7 @@ struct Output {
 
 struct Settings {
   int every = 0;       ///< steps between looks; 0: from the deck's own scales, see look_interval()
-  double depth = 2.0;  ///< cover, in mean granule diameters
+  double depth = 2.0;  ///< cover, in mean granule diameters: below the outer surface (live), around what moves (sleep)
   Exterior exterior = Exterior::live;
   double speed = 0.01;            ///< solid-state tolerance, fraction of sqrt(g d)
   int calm = 3;                   ///< looks in a row

@@ -22,13 +22,17 @@ struct ShellEntry {
   double normal_load = 0;           ///< sum of normal contact forces at locking (N), for the relative tolerance
   double excess = 0;                ///< largest load change over tolerance since the last wake-up
   std::int64_t lock_step = -1;      ///< of an exterior granule: when calm began
+  bool held = false;                ///< touched a wall that stands still when it was locked
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< at locking, given back only if no step has passed. Of an exterior
                                                       ///< granule: its velocity when calm began
 
   // all granules
   int walls = 0;            ///< walls and triangles touched at the last look
   bool wall_moves = false;  ///< one of them can move
+  bool stands = false;      ///< one of them stands still
   bool wall_near = true;    ///< within the skin of a wall; true until a look has seen that it is not
+  bool moving_wall_near = true;  ///< of one that can move; likewise
+  std::int64_t came_back = -1;   ///< step in which it came out of the store
 
   // exterior granules
   int calm = 0;             ///< looks in a row in solid state; of an interface granule: at rest against another body
@@ -45,7 +49,7 @@ struct ShellEntry {
     e.load_change = pose.turned_to_world(load_change);
     return e;
   }
-  static constexpr int packed_size = 26;
+  static constexpr int packed_size = 29;
   void pack(double* to) const {
     const double values[packed_size] = {double(locked),   double(fresh),   reference[0],       reference[1],
                                         reference[2],     load_change[0],  load_change[1],     load_change[2],
@@ -53,7 +57,7 @@ struct ShellEntry {
                                         velocity[0],      velocity[1],     velocity[2],        spin[0],
                                         spin[1],          spin[2],         double(walls),      double(wall_near),
                                         double(calm),     double(waited),  double(registered), registered_at[0],
-                                        registered_at[1], registered_at[2]};
+                                        registered_at[1], registered_at[2], double(held), double(moving_wall_near), double(stands)};
     for (int k = 0; k < packed_size; ++k) to[k] = values[k];
   }
   static ShellEntry unpack(const double* v) {
@@ -74,6 +78,9 @@ struct ShellEntry {
     e.waited = static_cast<int>(v[21]);
     e.registered = v[22] != 0;
     e.registered_at = Vec3(v[23], v[24], v[25]);
+    e.held = v[26] != 0;
+    e.moving_wall_near = v[27] != 0;
+    e.stands = v[28] != 0;
     return e;
   }
 };

@@ -7,7 +7,7 @@
 
 namespace solidcull {
 
-void MassProperties::add(double m, const Vec3& x, double r, int sign) {
+void MassProperties::add(double m, const Vec3& x, double r, int sign, bool is_held) {
   if (count == 0) *this = MassProperties{0, x};
   const Vec3 arm = x - about;
   count += sign;
@@ -15,6 +15,7 @@ void MassProperties::add(double m, const Vec3& x, double r, int sign) {
   first += sign * m * arm;
   second += sign * m * arm * arm.transpose();
   spin += sign * 0.4 * m * r * r;
+  if (is_held) held += sign;
 }
 
 void MassProperties::add(const MassProperties& other, int sign) {
@@ -26,6 +27,7 @@ void MassProperties::add(const MassProperties& other, int sign) {
   second +=
       sign * (other.second + other.first * arm.transpose() + arm * other.first.transpose() + other.mass * arm * arm.transpose());
   spin += sign * other.spin;
+  held += sign * other.held;
 }
 
 Eigen::Matrix3d MassProperties::inertia() const {
@@ -56,7 +58,7 @@ int SolidBodies::root(int body) const {
 }
 
 int SolidBodies::body_of(std::int64_t tag) const {
-  const int* body = member_.find(tag);
+  const int* body = member_.find(narrow_tag(tag));
   return body ? root(*body) : 0;
 }
 
@@ -92,11 +94,18 @@ void SolidBodies::centre_moved(SolidBody& body, const Vec3& from) {
   body.velocity_then += body.twist.spin.cross(to - from);
 }
 
+void SolidBodies::stand_still(SolidBody& body) { body.twist.velocity = body.twist.spin = Vec3::Zero(); }
+
 /// The body's velocity field becomes that of body and part tied together. The mass properties are the caller's.
 void SolidBodies::add(SolidBody& body, const RigidPart& part) {
   body.changed = true;
   if (body.mass.count == 0) {
     body.twist = {part.centre, part.velocity, part.spin};
+    if (body.grounded) stand_still(body);
+    return;
+  }
+  if (body.grounded) {
+    stand_still(body);
     return;
   }
   const RigidPart parts[] = {body.part(), part};
@@ -118,6 +127,7 @@ int SolidBodies::merge(int a, int b, Vec3 shift) {
       if (root(s.first) == b) s.second.shift(shift);
   }
   for (int d = 0; d < 3; ++d) kept.spans[d] = kept.spans[d] || gone.spans[d];
+  kept.grounded = kept.grounded || gone.grounded;
   add(kept, gone.part());
   if (kept.felt_known && gone.felt_known) {
     const double share = gone.mass.mass / (kept.mass.mass + gone.mass.mass);
@@ -154,10 +164,10 @@ SolidBodies::Place SolidBodies::lock(std::int64_t tag, const MovingGranule& gran
     const bool first = b.mass.count == 0;
     const Vec3 before = first ? Vec3(Vec3::Zero()) : b.pose.to_world(b.mass.centre());
     add(b, RigidPart::granule(granule.mass, granule.radius, position, granule.velocity, granule.spin));
-    b.mass.add(granule.mass, b.pose.to_frame(position), granule.radius);
+    b.mass.add(granule.mass, b.pose.to_frame(position), granule.radius, 1, granule.held);
     b.summed = std::max(b.summed, b.mass.count);
     if (!first) centre_moved(b, before);
-    member_[tag] = number = body;
+    member_[narrow_tag(tag)] = number = body;
   };
   contacts.for_each_partner(tag, [&](std::int64_t partner) {
     const int theirs = body_of(partner);
@@ -185,18 +195,19 @@ void SolidBodies::unlock(std::int64_t tag, const GranuleMass& granule, const Fro
                          const MovingGranule* given) {
   const int number = body_of(tag);
   if (!number) return;
-  member_.erase(tag);
+  member_.erase(narrow_tag(tag));
   contacts.for_each_partner(tag, [&](std::int64_t partner) { cut_.push_back(partner); });
   SolidBody& body = bodies_[number];
   body.changed = true;
   const Vec3 before = body.pose.to_world(body.mass.centre());
-  body.mass.add(granule.mass, granule.position, granule.radius, -1);
+  body.mass.add(granule.mass, granule.position, granule.radius, -1, granule.held);
   if (body.mass.count == 0) {
     bodies_.erase(number);
     return;
   }
   centre_moved(body, before);
-  if (!given) return;
+  if (body.grounded) stand_still(body);
+  if (!given || body.grounded) return;
   // the difference to the body's own field stays with the body
   RigidPart rest = body.part();
   const Vec3 own_velocity = body.twist.at(given->position), own_spin = body.twist.spin;
@@ -216,14 +227,14 @@ void SolidBodies::sum_anew(int number, std::int64_t member, const FrozenContacts
   seen[member] = 1;
   for (std::size_t at = 0; at < reached.size(); ++at)
     contacts.for_each_partner(reached[at], [&](std::int64_t partner) {
-      if (!member_.contains(partner) || seen.contains(partner)) return;
+      if (!is_member(partner) || seen.contains(partner)) return;
       seen[partner] = 1;
       reached.push_back(partner);
     });
   MassProperties sum;
   for (const std::int64_t tag : reached) {
     const GranuleMass g = mass_of(tag);
-    sum.add(g.mass, g.position, g.radius);
+    sum.add(g.mass, g.position, g.radius, 1, g.held);
   }
   bodies_[number].mass = sum;
   bodies_[number].summed = sum.count;
@@ -245,6 +256,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
   for (auto& [body, tags] : sources) {
     std::sort(tags.begin(), tags.end());
     tags.erase(std::unique(tags.begin(), tags.end()), tags.end());
+    const bool was_grounded = bodies_[body].grounded;
     std::vector<Search> searches(tags.size());
     FlatMap<int> seen;
     for (std::size_t s = 0; s < tags.size(); ++s) {
@@ -266,7 +278,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       if (mine.next < mine.reached.size()) {
         const std::int64_t tag = mine.reached[mine.next++];
         contacts.for_each_partner(tag, [&](std::int64_t partner) {
-          if (!member_.contains(partner)) return;
+          if (!is_member(partner)) return;
           if (const int* other = seen.find(partner)) {
             const int o = leader(*other);
             if (o == s) return;
@@ -303,7 +315,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       MassProperties gone;
       for (const std::int64_t tag : mine.reached) {
         const GranuleMass g = mass_of(tag);
-        gone.add(g.mass, g.position, g.radius);
+        gone.add(g.mass, g.position, g.radius, 1, g.held);
       }
       rest.mass.add(gone, -1);
       // what was tied to its own image may hang free of it now: its places are brought together again
@@ -316,7 +328,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       for (std::size_t at = 0; at < order.size(); ++at) {
         const Vec3 here = place[at];
         contacts.for_each_partner(order[at], [&](std::int64_t partner) {
-          if (!member_.contains(partner)) return;
+          if (!is_member(partner)) return;
           const int* known = index.find(partner);
           const Vec3 there = known ? place[*known] : mass_of(partner).position;
           const Vec3 shift = tied ? to_image_of(off.pose.turned_to_world(there - here)) : Vec3(Vec3::Zero());
@@ -331,11 +343,14 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       }
       for (std::size_t at = 0; at < order.size(); ++at) {
         const GranuleMass g = mass_of(order[at]);
-        off.mass.add(g.mass, place[at], g.radius);
-        member_[order[at]] = fresh;
+        off.mass.add(g.mass, place[at], g.radius, 1, g.held);
+        member_[narrow_tag(order[at])] = fresh;
         moved(order[at], fresh, place[at]);
       }
       off.summed = off.mass.count;
+      if (was_grounded) stand_still(off);
+      off.grounded = was_grounded && off.mass.held > 0;
+      rest.grounded = was_grounded && rest.mass.held > 0;
       split_parents_.push_back(body);
     }
     for (const std::int64_t tag : tags) {

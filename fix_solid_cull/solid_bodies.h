@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -24,8 +25,9 @@ struct MassProperties {
   Vec3 first = Vec3::Zero();                         ///< sum of m (x - about)
   Eigen::Matrix3d second = Eigen::Matrix3d::Zero();  ///< sum of m (x - about) (x - about)^T
   double spin = 0;                                   ///< sum of 2/5 m r^2, each granule's own inertia
+  std::int64_t held = 0;                             ///< granules that touch a wall that stands still
 
-  void add(double m, const Vec3& x, double r, int sign = 1);
+  void add(double m, const Vec3& x, double r, int sign = 1, bool is_held = false);
   void add(const MassProperties& other, int sign = 1);
   Vec3 centre() const { return about + first / mass; }                  ///< m; undefined for no mass
   Eigen::Matrix3d inertia() const;                                      ///< about the centre of mass, kg m^2
@@ -37,12 +39,14 @@ struct GranuleMass {
   double mass;
   Vec3 position;
   double radius;
+  bool held = false;  ///< it touches a wall that stands still
 };
 
 /// A granule that is to be locked, or is given back with this motion. World frame.
 struct MovingGranule {
   double mass, radius;
   Vec3 position, velocity, spin;
+  bool held = false;  ///< it touches a wall that stands still
 };
 
 struct SolidBody {
@@ -60,6 +64,9 @@ struct SolidBody {
   Vec3 velocity_then = Vec3::Zero();  ///< of the centre, when the window of the mean acceleration began (m/s)
   std::int64_t step_then = -1;
   Vec3 acceleration = Vec3::Zero();  ///< mean over the last window (m/s^2)
+  /// It stands still: what it is given goes to the ground. A body that merges with a grounded one is grounded; of the parts of a
+  /// grounded one those are that hold a granule that is held.
+  bool grounded = false;
 
   /// Calls visit(number) with a reference to each number of the state, in one order: to write it to a file and to read it back.
   template <class Visit>
@@ -73,6 +80,7 @@ struct SolidBody {
     for (int k = 0; k < 4; ++k) visit(turn.coeffs()[k]);
     pose = Pose(origin, turn);
     visit(mass.count);
+    visit(mass.held);
     vector(mass.about);
     visit(mass.mass);
     vector(mass.first);
@@ -91,6 +99,7 @@ struct SolidBody {
     vector(velocity_then);
     visit(step_then);
     vector(acceleration);
+    visit(grounded);
   }
 
   RigidPart part() const;  ///< this rank's part, world frame
@@ -108,7 +117,7 @@ class SolidBodies {
   void set_periods(const Vec3& periods) { periods_ = periods; }
 
   /// A granule is locked: it joins the bodies of its frozen contacts (which merge if they were several), or founds one.
-  /// Momentum and angular momentum are kept.
+  /// Momentum and angular momentum are kept, but for what a grounded body is given.
   struct Place {
     int body = 0;
     Vec3 position = Vec3::Zero();  ///< frame of the body (m)
@@ -117,7 +126,7 @@ class SolidBodies {
 
   /// A body as it was (from a restart file), and a granule that was in it. Returns its number.
   int found(const SolidBody& body);
-  void take_in(std::int64_t tag, int body) { member_[tag] = body; }
+  void take_in(std::int64_t tag, int body) { member_[narrow_tag(tag)] = body; }
 
   /// Two locked granules are tied together by a contact that is frozen now: their bodies merge if they were two.
   void join(std::int64_t a, std::int64_t b, const MassOf& mass_of);
@@ -146,6 +155,7 @@ class SolidBodies {
   const std::map<int, SolidBody>& bodies() const { return bodies_; }
   std::size_t size() const { return bodies_.size(); }
   std::size_t locked() const { return member_.size(); }
+  std::size_t member_bytes() const { return member_.memory_bytes(); }
   template <class Visit>
   void for_each_member(Visit visit) const {
     member_.for_each([&](std::int64_t tag, int body) { visit(tag, root(body)); });
@@ -164,13 +174,15 @@ class SolidBodies {
   int found();
   int merge(int a, int b, Vec3 shift);
   int tie(int a, Vec3& position_in_a, int b, const Vec3& position_in_b);
+  bool is_member(std::int64_t tag) const { return member_.contains(narrow_tag(tag)); }
+  static void stand_still(SolidBody& body);
   static void add(SolidBody& body, const RigidPart& part);
   static void centre_moved(SolidBody& body, const Vec3& from);
   Vec3 to_image_of(const Vec3& there) const;  // shift that brings a distance to its shortest image
   void sum_anew(int number, std::int64_t member, const FrozenContacts& contacts, const MassOf& mass_of);
 
   Vec3 periods_ = Vec3::Zero();
-  FlatMap<int> member_;                 // tag -> body, to be resolved by root()
+  FlatMap<int, std::int32_t> member_;   // tag -> body, to be resolved by root()
   mutable std::vector<int> parent_{0};  // union-find over body numbers; 0 is no body
   std::map<int, SolidBody> bodies_;     // living bodies only
   std::map<int, Pose> swallowed_;

@@ -10,17 +10,22 @@ namespace {
 
 constexpr double diameter = 0.0026;
 
-class NoOp : public testing::TestWithParam<Bed> {};
+struct Case {
+  Bed bed;
+  std::string cover;  // keywords of the fix
+};
+
+class NoOp : public testing::TestWithParam<Case> {};
 
 TEST_P(NoOp, ForcesHistoriesAndFuture) {
-  const Bed bed = GetParam();
+  const Bed& bed = GetParam().bed;
   const std::string deck = read_bed(bed);
   const std::string looks = "run 100\nrun 0\n";  // the last look chooses, the next run's setup culls
 
   Engine never;
   never.run(deck + looks);
   Engine culled;
-  culled.run(deck + "fix cull all solid/cull every 50 calm 2 depth 1.5 speed 0.05 tolerance 12 0\n" + looks);
+  culled.run(deck + "fix cull all solid/cull every 50 calm 2 speed 0.05 tolerance 12 0 " + GetParam().cover + "\n" + looks);
   const double interior = culled.vector("cull", 3), interface = culled.vector("cull", 2);
   EXPECT_GT(interior, 0.1 * bed.granules) << "nothing was stored: the test shows nothing";
   EXPECT_GT(interface, 0.05 * bed.granules);
@@ -85,19 +90,25 @@ Bed periodic() {
   return b;
 }
 
+const char* cover = "depth 1.5";
+
 INSTANTIATE_TEST_SUITE_P(
     Models, NoOp,
-    testing::Values(bed("hertz_history_epsd2", "model hertz tangential history rolling_friction epsd2"),
-                    bed("hertz_history_mesh", "model hertz tangential history", true),
-                    bed("hertz_plain", "model hertz tangential no_history"),
-                    bed("hertz_cdt", "model hertz tangential history rolling_friction cdt"),
-                    bed("hooke_history", "model hooke tangential history"),
-                    bed("hooke_history_epsd_mesh", "model hooke tangential history rolling_friction epsd", true),
-                    bed("hooke_plain_mesh", "model hooke tangential no_history", true),
-                    bed("hertz_sjkr", "model hertz tangential history cohesion sjkr", false, true),
-                    bed("hertz_sjkr_mesh", "model hertz tangential history cohesion sjkr rolling_friction epsd2", true, true),
-                    periodic()),
-    [](const testing::TestParamInfo<Bed>& info) { return info.param.name; });
+    testing::Values(Case{bed("hertz_history_epsd2", "model hertz tangential history rolling_friction epsd2"), cover},
+                    Case{bed("hertz_history_mesh", "model hertz tangential history", true), cover},
+                    Case{bed("hertz_plain", "model hertz tangential no_history"), cover},
+                    Case{bed("hertz_cdt", "model hertz tangential history rolling_friction cdt"), cover},
+                    Case{bed("hooke_history", "model hooke tangential history"), cover},
+                    Case{bed("hooke_history_epsd_mesh", "model hooke tangential history rolling_friction epsd", true), cover},
+                    Case{bed("hooke_plain_mesh", "model hooke tangential no_history", true), cover},
+                    Case{bed("hertz_sjkr", "model hertz tangential history cohesion sjkr", false, true), cover},
+                    Case{bed("hertz_sjkr_mesh", "model hertz tangential history cohesion sjkr rolling_friction epsd2", true, true), cover},
+                    Case{periodic(), cover},
+                    Case{bed("hertz_history_epsd2_sleep", "model hertz tangential history rolling_friction epsd2"), "exterior sleep"},
+                    Case{bed("hertz_history_mesh_sleep", "model hertz tangential history", true), "exterior sleep"},
+                    Case{bed("hooke_history_epsd_mesh_sleep", "model hooke tangential history rolling_friction epsd", true),
+                         "exterior sleep"}),
+    [](const testing::TestParamInfo<Case>& info) { return info.param.bed.name; });
 
 }  // namespace
 }  // namespace decks

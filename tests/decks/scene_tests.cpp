@@ -47,6 +47,46 @@ TEST(Scenes, WallLoadsOfABedAtRest) {
     std::printf("floor %.8g -> %.8g N, side %.8g -> %.8g N\n", floor, e.vector("floor", 3), side, e.vector("side", 1));
 }
 
+TEST(Scenes, ABedThatSleepsStillWeighsOnItsWalls) {
+  Engine e;
+  const Bed bed = mesh_bed("asleep");
+  e.run(read_bed(bed) + "run 50\n");
+  const double load[] = {e.vector("floor", 3), e.vector("side", 1), e.vector("side", 3), e.vector("floor", 4), e.vector("floor", 5)};
+  const double lever = std::abs(load[0]) * bed.side;
+  e.run("fix cull all solid/cull exterior sleep every 50\nrun 1500\n");
+  EXPECT_EQ(f(e, 1) + f(e, 2) + f(e, 3), 1300);
+  EXPECT_GT(f(e, 3), 1250) << "granules at the walls are in the store too";
+  const auto weighs = [&] {
+    EXPECT_NEAR(e.vector("floor", 3), load[0], 1e-3 * std::abs(load[0]));
+    EXPECT_NEAR(e.vector("side", 1), load[1], 1e-3 * std::abs(load[1]));
+    EXPECT_NEAR(e.vector("side", 3), load[2], 1e-3 * std::abs(load[1]));
+    EXPECT_NEAR(e.vector("floor", 4), load[3], 1e-3 * lever);
+    EXPECT_NEAR(e.vector("floor", 5), load[4], 1e-3 * lever);
+  };
+  weighs();
+  e.run("run 1\n");  // a new run: granules at walls are atoms until they are seen to rest
+  EXPECT_LT(f(e, 3), 1000);
+  weighs();
+  e.run("run 300\n");
+  EXPECT_GT(f(e, 3), 1250);
+  weighs();
+  if (e.rank() == 0)
+    std::printf("%g interior; floor %.8g -> %.8g N, side %.8g -> %.8g N\n", f(e, 3), load[0], e.vector("floor", 3), load[1],
+                e.vector("side", 1));
+  const auto lowest = [&] {
+    double z = 1;
+    for (const auto& g : e.state()) z = std::min(z, g.second.x[2]);
+    return z;
+  };
+  e.run("run 0\n");
+  const double before = lowest();
+  e.run("fix gone all move/mesh mesh floor linear 0 0 -0.05\nrun 600\n");
+  EXPECT_GT(f(e, 7), 100) << "what rested on the floor wakes";
+  e.run("unfix cull\nrun 0\n");
+  EXPECT_EQ(e.state().size(), 1300u);
+  EXPECT_LT(lowest(), before - 0.0005) << "nothing follows the floor";
+}
+
 TEST(Scenes, RestartWhileCulledGoesOnAsIfItHadNotStopped) {
   const Bed bed = mesh_bed("restart");
   const std::string fix = "fix cull all solid/cull every 50 calm 2 depth 1.5\n";

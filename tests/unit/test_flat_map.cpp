@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 #include <string>
 #include <unordered_map>
@@ -11,11 +12,12 @@ namespace {
 
 using Reference = std::unordered_map<std::int64_t, int>;
 
-void expect_same(const FlatMap<int>& map, const Reference& reference) {
+template <class Key>
+void expect_same(const FlatMap<int, Key>& map, const Reference& reference) {
   ASSERT_EQ(map.size(), reference.size());
   ASSERT_EQ(map.empty(), reference.empty());
   for (const auto& r : reference) {
-    const int* found = map.find(r.first);
+    const int* found = map.find(static_cast<Key>(r.first));
     ASSERT_NE(found, nullptr) << "key " << r.first << " is lost";
     ASSERT_EQ(*found, r.second);
   }
@@ -29,12 +31,13 @@ void expect_same(const FlatMap<int>& map, const Reference& reference) {
 }
 
 /// `operations` random insertions and removals over `keys` keys, compared every so often.
+template <class Key = std::int64_t>
 void random_operations(unsigned seed, std::int64_t keys, int operations, int compare_every) {
   std::mt19937_64 random(seed);
-  FlatMap<int> map;
+  FlatMap<int, Key> map;
   Reference reference;
   for (int n = 0; n < operations; ++n) {
-    const std::int64_t key = static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(keys)) - keys / 2;
+    const Key key = static_cast<Key>(random() % static_cast<std::uint64_t>(keys)) - static_cast<Key>(keys / 2);
     if (random() % 2) {
       const int value = static_cast<int>(random() % 1000);
       map[key] = value;
@@ -84,11 +87,14 @@ TEST(FlatMap, takes_the_ends_of_the_key_range) {
 TEST(FlatMap, removal_shifts_back_what_was_displaced) {
   for (unsigned seed = 0; seed < 300; ++seed) random_operations(seed, 9, 200, 1);
   for (unsigned seed = 0; seed < 20; ++seed) random_operations(seed, 60, 2000, 7);
+  for (unsigned seed = 0; seed < 300; ++seed) random_operations<std::int32_t>(seed, 9, 200, 1);
 }
 
 TEST(FlatMap, does_as_unordered_map_does_under_random_operations) {
   random_operations(1, 3000, 200000, 20000);
   random_operations(2, INT64_MAX, 20000, 2000);
+  random_operations<std::int32_t>(3, 3000, 200000, 20000);
+  random_operations<std::int32_t>(4, INT32_MAX, 20000, 2000);
 }
 
 TEST(FlatMap, removal_leaves_no_tombstones) {
@@ -121,6 +127,49 @@ TEST(FlatMap, clear_empties_it_and_keeps_the_memory) {
   map.for_each([](std::int64_t, int) { ADD_FAILURE(); });
   EXPECT_EQ(map[1], 0);
   EXPECT_EQ(map.size(), 1u);
+}
+
+TEST(FlatMap, clear_gives_back_what_is_much_more_than_was_in_use) {
+  FlatMap<int> map;
+  map.reserve(1000000);
+  EXPECT_GT(map.memory_bytes(), 10000000u);
+  for (int k = 0; k < 1000; ++k) map[k] = k + 1;
+  map.clear();
+  EXPECT_EQ(map.memory_bytes(), 0u);
+  EXPECT_EQ(map.find(1), nullptr);
+  for (int k = 0; k < 1000; ++k) map[k] = k + 1;
+  const std::size_t bytes = map.memory_bytes();
+  EXPECT_LT(bytes, 100000u);
+  for (int round = 0; round < 5; ++round) {
+    map.clear();
+    EXPECT_EQ(map.memory_bytes(), bytes);
+    for (int k = 0; k < 1000; ++k) map[k] = k + 1;
+  }
+  map.clear();
+  map.clear();
+  EXPECT_EQ(map.memory_bytes(), 0u) << "not in use at all";
+}
+
+TEST(FlatMap, a_map_of_numbers_of_32_bits_takes_14_bytes_per_element) {
+  FlatMap<int, std::int32_t> map;
+  double sum = 0, log_size = 0;
+  for (int k = 1; k <= 1000000; ++k) {
+    map[k] = k;
+    if (k < 1000) continue;
+    const double bytes = static_cast<double>(map.memory_bytes()) / k, weight = std::log1p(1.0 / k);
+    ASSERT_LE(bytes, 16.1);
+    sum += weight * bytes;
+    log_size += weight;
+  }
+  EXPECT_LE(sum / log_size, 14.0);
+}
+
+TEST(FlatMap, copying_in_the_order_of_another_map_does_not_heap_up) {
+  // quadratic otherwise: minutes, not a second
+  FlatMap<int, std::int32_t> from, to;
+  for (int k = 0; k < 1000000; ++k) from[k] = k;
+  from.for_each([&](std::int32_t key, int value) { to[key] = value; });
+  EXPECT_EQ(to.size(), from.size());
 }
 
 TEST(FlatMap, reserve_makes_room_and_loses_nothing) {

@@ -244,6 +244,59 @@ TEST(FrozenContacts, turning_what_has_no_contacts_or_no_history_does_nothing) {
   EXPECT_EQ(seen_by(contacts, 2)[1], History());
 }
 
+TEST(FrozenContacts, a_wide_history_is_kept_as_well) {
+  for (const std::size_t width : {32, 33, 100}) {
+    FrozenContacts contacts = with_layout(std::vector<bool>(width, true));
+    History h(width), turned(width);
+    for (std::size_t d = 0; d < width; ++d) turned[d] = -(h[d] = 1.0 + static_cast<double>(d));
+    contacts.add(1, 2, h.data());
+    EXPECT_EQ(seen_by(contacts, 1)[2], h);
+    EXPECT_EQ(seen_by(contacts, 2)[1], turned);
+  }
+}
+
+TEST(FrozenContacts, a_contact_without_numbers_may_have_a_history) {
+  FrozenContacts contacts = with_layout({});
+  const double h[] = {0};
+  contacts.add(1, 2, h);
+  contacts.add(2, 3, nullptr);
+  int with = 0, all = 0;
+  contacts.for_each_contact([&](std::int64_t, std::int64_t, const double* history) {
+    ++all;
+    with += history != nullptr;
+  });
+  EXPECT_EQ(all, 2);
+  EXPECT_EQ(with, 1);
+}
+
+TEST(FrozenContacts, takes_the_tags_of_the_engine_only) {
+  FrozenContacts contacts = with_layout({});
+  EXPECT_THROW(contacts.add(1, std::int64_t{INT32_MAX} + 1, nullptr), std::logic_error);
+  EXPECT_THROW(contacts.add(std::int64_t{INT32_MIN}, 1, nullptr), std::logic_error);
+  EXPECT_EQ(contacts.size(), 0u);
+  contacts.add(INT32_MIN + 1, INT32_MAX, nullptr);
+  EXPECT_TRUE(contacts.contains(INT32_MAX, INT32_MIN + 1));
+}
+
+TEST(FrozenContacts, an_edge_takes_16_bytes_and_its_history) {
+  constexpr int n = 40;  // a cubic lattice: three edges per node
+  for (const std::size_t width : {0, 3}) {
+    FrozenContacts contacts = with_layout(std::vector<bool>(width, true));
+    const History h(width, 1.0);
+    const auto tag = [](int i, int j, int k) { return (i * n + j) * n + k; };
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j)
+        for (int k = 0; k < n; ++k) {
+          const double* history = width ? h.data() : nullptr;
+          if (i) contacts.add(tag(i, j, k), tag(i - 1, j, k), history);
+          if (j) contacts.add(tag(i, j, k), tag(i, j - 1, k), history);
+          if (k) contacts.add(tag(i, j, k), tag(i, j, k - 1), history);
+        }
+    const double edges = static_cast<double>(contacts.size()), nodes = n * n * n;
+    EXPECT_LE(static_cast<double>(contacts.memory_bytes()), edges * (17.0 + 8.0 * static_cast<double>(width)) + 16.1 * nodes);
+  }
+}
+
 TEST(FrozenContacts, does_as_a_map_of_pairs_does_under_random_operations) {
   const std::vector<bool> flips{true, false, true};
   std::mt19937 random(7);

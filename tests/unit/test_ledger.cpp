@@ -60,6 +60,7 @@ TEST(Ledger, agrees_with_the_store_through_a_million_moves) {
   }
   EXPECT_EQ(books.ledger.count_due(), static_cast<std::int64_t>(books.store.size()));
   EXPECT_LE(std::abs(books.ledger.mass_error(books.store)), 1e-14 * books.store.mass());
+  EXPECT_NEAR(books.store.mass(), books.store.mass_recounted(), 1e-14 * books.store.mass());
   while (!there.empty()) {
     books.take(there.back());
     there.pop_back();
@@ -75,6 +76,7 @@ TEST(Ledger, finds_a_granule_that_is_missing_from_the_store) {
   std::vector<double> record;
   books.store.take(2, record);
   EXPECT_DOUBLE_EQ(books.ledger.mass_error(books.store), -3e-6);
+  EXPECT_DOUBLE_EQ(books.store.mass_recounted(), 2e-6);
   EXPECT_EQ(books.ledger.count_due() - static_cast<std::int64_t>(books.store.size()), 1);
 }
 

@@ -58,6 +58,13 @@ void expect_same(const Settings& a, const Settings& b) {
 
 // ----------------------------------------------------------------------------------------------------------- what is taken
 
+TEST(Settings, a_sleeping_surface_needs_no_cover) {
+  EXPECT_EQ(parsed("exterior sleep").exterior, Exterior::sleep);
+  EXPECT_EQ(parsed("exterior sleep").depth, 0.0);
+  EXPECT_EQ(parsed("exterior sleep depth 1.5").depth, 1.5);
+  EXPECT_EQ(parsed("depth 1.5 exterior sleep").depth, 1.5);
+}
+
 TEST(Settings, without_keywords_are_the_defaults) {
   const Settings s = parsed("");
   EXPECT_EQ(s.every, 0);
@@ -115,7 +122,8 @@ TEST(Settings, keywords_come_in_any_order_and_the_last_word_counts) {
 
 TEST(Settings, the_limits_themselves_are_allowed) {
   for (const char* line : {"every 1", "every 2000000000", "depth 50", "calm 1", "tolerance 0 0.1", "tolerance 0.1 0", "carve 1 1",
-                           "voxel 0.1", "depth 4 voxel 2", "depth 1 voxel 0.5", "speed 1e-9", "walls closed", "walls surface",
+                           "voxel 0.1", "exterior sleep", "exterior sleep depth 0", "depth 0 exterior sleep", "exterior sleep depth 1 voxel 2",
+                           "depth 4 voxel 2", "depth 1 voxel 0.5", "speed 1e-9", "walls closed", "walls surface",
                            "motion rigid", "motion fixed", "mesh 1 a.vdb", "mesh 1 a.stl", "mesh 1 a.vtp", "bed 1 a.vtp"})
     EXPECT_EQ(refusal(line), "") << line;
 }
@@ -148,15 +156,16 @@ const Refusal refusals[] = {
     {"every", "keyword 'every' ends too early: give a whole number of steps, 1 or more"},
     {"every calm 3", "keyword 'every' has the value 'calm': give a whole number of steps, 1 or more"},
 
-    {"depth 0", "keyword 'depth' has the value '0': give a number of mean diameters, more than 0 and at most 50"},
-    {"depth -1", "keyword 'depth' has the value '-1': give a number of mean diameters, more than 0 and at most 50"},
-    {"depth 51", "keyword 'depth' has the value '51': give a number of mean diameters, more than 0 and at most 50"},
-    {"depth nan", "keyword 'depth' has the value 'nan': give a number of mean diameters, more than 0 and at most 50"},
-    {"depth 2d", "keyword 'depth' has the value '2d': give a number of mean diameters, more than 0 and at most 50"},
-    {"depth", "keyword 'depth' ends too early: give a number of mean diameters, more than 0 and at most 50"},
+    {"depth 0",
+     "keyword 'depth' has the value '0' and 'exterior' the value 'live': give a cover of more than 0, or say 'exterior sleep'"},
+    {"depth -1", "keyword 'depth' has the value '-1': give a number of mean diameters, 0 to 50"},
+    {"depth 51", "keyword 'depth' has the value '51': give a number of mean diameters, 0 to 50"},
+    {"depth nan", "keyword 'depth' has the value 'nan': give a number of mean diameters, 0 to 50"},
+    {"depth 2d", "keyword 'depth' has the value '2d': give a number of mean diameters, 0 to 50"},
+    {"depth", "keyword 'depth' ends too early: give a number of mean diameters, 0 to 50"},
 
-    {"exterior sleep", "keyword 'exterior' has the value 'sleep': give 'live'"},
-    {"exterior", "keyword 'exterior' ends too early: give 'live'"},
+    {"exterior rest", "keyword 'exterior' has the value 'rest': give 'live' or 'sleep'"},
+    {"exterior", "keyword 'exterior' ends too early: give 'live' or 'sleep'"},
 
     {"speed 0", "keyword 'speed' has the value '0': give a fraction of sqrt(g d), more than 0"},
     {"speed -0.1", "keyword 'speed' has the value '-0.1': give a fraction of sqrt(g d), more than 0"},

@@ -27,11 +27,11 @@ struct Solid {
   GranuleMass mass(std::int64_t tag) const {
     const MovingGranule& g = granules.at(tag);
     const auto at = places.find(tag);
-    if (at == places.end()) return {g.mass, g.position, g.radius};
+    if (at == places.end()) return {g.mass, g.position, g.radius, g.held};
     const int body = bodies.body_of(tag);
     const Vec3& p = at->second.position;
-    if (body == at->second.body) return {g.mass, p, g.radius};
-    return {g.mass, bodies.pose(body).to_frame(bodies.pose(at->second.body).to_world(p)), g.radius};
+    if (body == at->second.body) return {g.mass, p, g.radius, g.held};
+    return {g.mass, bodies.pose(body).to_frame(bodies.pose(at->second.body).to_world(p)), g.radius, g.held};
   }
   SolidBodies::MassOf mass_of() const {
     return [this](std::int64_t tag) { return mass(tag); };
@@ -128,7 +128,7 @@ struct Solid {
 
 MovingGranule granule(double mass, const Vec3& position, double radius, const Vec3& velocity = Vec3::Zero(),
                       const Vec3& spin = Vec3::Zero()) {
-  return {mass, radius, position, velocity, spin};
+  return {mass, radius, position, velocity, spin, false};
 }
 
 /// n granules of 1 mm side by side, tags from 1; `ring`: the last touches the first.
@@ -151,7 +151,7 @@ MassProperties sum_of(const Solid& solid, const Tags& tags) {
   MassProperties p;
   for (const std::int64_t tag : tags) {
     const GranuleMass g = solid.mass(tag);
-    p.add(g.mass, g.position, g.radius);
+    p.add(g.mass, g.position, g.radius, 1, g.held);
   }
   return p;
 }
@@ -172,6 +172,7 @@ Eigen::Matrix3d second_moment(const MassProperties& p) {
 
 void expect_same(const MassProperties& is, const MassProperties& due, double relative, const MassProperties& scale) {
   EXPECT_EQ(is.count, due.count);
+  EXPECT_EQ(is.held, due.held);
   EXPECT_NEAR(is.mass, due.mass, relative * scale.mass);
   EXPECT_LE((first_moment(is) - first_moment(due)).norm(), relative * first_moment(scale).norm());
   EXPECT_LE((second_moment(is) - second_moment(due)).norm(), relative * second_moment(scale).norm());
@@ -427,6 +428,7 @@ void random_graph(unsigned seed, int granules, double contacts_per_granule, int 
   for (int k = 0; k < granules; ++k) {
     const double x = at(random), y = at(random), z = at(random), r = radius(random);
     solid.granules[k] = granule(1e4 * r * r * r, Vec3(x, y, z), r);
+    solid.granules[k].held = k % 7 == 0;
   }
   for (int e = 0; e < contacts_per_granule * granules / 2; ++e) {
     const int a = static_cast<int>(random() % granules), b = static_cast<int>(random() % granules);
@@ -489,6 +491,151 @@ TEST(SolidBodies, are_the_connected_components_of_a_carved_lattice) {
     ASSERT_EQ(solid.partition(), solid.connected_components());
     expect_right_figures(solid);
   }
+}
+
+// ---------------------------------------------------------------------------------------------------- what touches the ground
+
+TEST(MassProperties, count_what_is_held) {
+  MassProperties p, q;
+  p.add(1, Vec3(1, 2, 3), 0.1, 1, true);
+  p.add(1, Vec3(1, 2, 4), 0.1);
+  q.add(1, Vec3(1, 2, 5), 0.1, 1, true);
+  EXPECT_EQ(p.held, 1);
+  p.add(q);
+  EXPECT_EQ(p.held, 2);
+  const Pose there(Vec3(1, 0, 0), Eigen::Quaterniond(0.8, 0.6, 0, 0));
+  EXPECT_EQ(p.seen_from(Pose(), there).held, 2);
+  p.add(1, Vec3(1, 2, 3), 0.1, -1, true);
+  EXPECT_EQ(p.held, 1);
+  p.add(q, -1);
+  EXPECT_EQ(p.held, 0);
+  EXPECT_EQ(p.count, 1);
+}
+
+void expect_at_rest(const SolidBody& body) {
+  EXPECT_EQ(body.twist.velocity, Vec3(Vec3::Zero()));
+  EXPECT_EQ(body.twist.spin, Vec3(Vec3::Zero()));
+}
+
+TEST(SolidBodies, a_grounded_body_gives_the_ground_what_comes_in) {
+  Solid solid = chain(3);
+  SolidBody& body = solid.bodies.body(1);
+  body.grounded = true;
+  body.changed = false;
+  solid.granules[4] = granule(1e-6, Vec3(4e-3, 0, 0), 5e-4, Vec3(0, 3, 0), Vec3(100, 0, 0));
+  solid.touch(3, 4);
+  solid.lock(4);
+  EXPECT_TRUE(body.grounded);
+  EXPECT_TRUE(body.changed);
+  expect_at_rest(body);
+  EXPECT_EQ(body.mass.count, 4);
+  // a granule that goes on with a motion of its own leaves the body where it is
+  MovingGranule given = solid.now(4);
+  given.velocity = Vec3(0, 5, 0);
+  solid.unlock({4}, {{4, given}});
+  expect_at_rest(body);
+}
+
+TEST(SolidBodies, a_body_that_merges_with_a_grounded_one_is_grounded) {
+  for (const bool large_is_grounded : {true, false})
+    for (const bool by_lock : {true, false}) {
+      Solid solid;
+      for (int k = 1; k <= 7; ++k)
+        solid.granules[k] =
+            granule(1e-6, Vec3(1e-3 * k, 0, 0), 5e-4, (k > 4) == large_is_grounded ? Vec3(0, 0, 0) : Vec3(0, 0, 2));
+      solid.granules[large_is_grounded ? 7 : 1].held = true;
+      for (const int k : {1, 2, 4, 5, 6}) solid.touch(k, k + 1);  // 1..3 and 4..7
+      for (int k = 1; k <= 7; ++k)
+        if (k != 4 || !by_lock) solid.lock(k);
+      if (by_lock) {
+        solid.granules[4].velocity = Vec3(1, 1, 1);
+        solid.touch(3, 4);
+      }
+      solid.bodies.body(solid.bodies.body_of(large_is_grounded ? 7 : 1)).grounded = true;
+      if (by_lock)
+        solid.lock(4);
+      else
+        solid.join(3, 4);
+      ASSERT_EQ(solid.bodies.size(), 1u);
+      const SolidBody& body = solid.bodies.bodies().begin()->second;
+      EXPECT_TRUE(body.grounded);
+      expect_at_rest(body);
+      EXPECT_EQ(body.mass.held, 1);
+    }
+}
+
+TEST(SolidBodies, ungrounded_bodies_merge_as_ever) {
+  Solid solid;
+  solid.granules[1] = granule(1, Vec3::Zero(), 0.5, Vec3(0, 0, 2));
+  solid.granules[2] = granule(1, Vec3(1, 0, 0), 0.5, Vec3(0, 0, 4));
+  solid.granules[2].held = true;  // the adapter says which bodies are grounded
+  solid.lock(1);
+  solid.lock(2);
+  solid.join(1, 2);
+  const SolidBody& body = solid.bodies.bodies().begin()->second;
+  EXPECT_FALSE(body.grounded);
+  EXPECT_DOUBLE_EQ(body.twist.at(Vec3(0.5, 0, 0))[2], 3);
+}
+
+TEST(SolidBodies, of_the_parts_of_a_grounded_body_those_are_grounded_that_are_held) {
+  for (int held_parts = 0; held_parts < 8; ++held_parts)
+    for (const bool was_grounded : {true, false}) {
+      // 1..5, 7..10, 12..14 after the cut; the first is the rest
+      Solid solid = chain(14);
+      const std::int64_t member[] = {1, 8, 14};
+      for (int part = 0; part < 3; ++part)
+        if (held_parts >> part & 1) {
+          solid.unlock({member[part]});
+          solid.granules[member[part]].held = true;
+          if (member[part] > 1) solid.touch(member[part], member[part] - 1);
+          if (member[part] < 14) solid.touch(member[part], member[part] + 1);
+          solid.lock(member[part]);
+          solid.adopt();
+        }
+      ASSERT_EQ(solid.bodies.size(), 1u);
+      const int whole = solid.bodies.body_of(1);
+      solid.bodies.body(whole).grounded = was_grounded;
+      solid.unlock({6, 11});
+      ASSERT_EQ(solid.bodies.size(), 3u);
+      for (int part = 0; part < 3; ++part) {
+        const SolidBody& body = solid.bodies.body(solid.bodies.body_of(member[part]));
+        EXPECT_EQ(body.mass.held, held_parts >> part & 1);
+        EXPECT_EQ(body.grounded, was_grounded && (held_parts >> part & 1)) << "part " << part;
+        expect_at_rest(body);
+      }
+      expect_right_figures(solid);
+    }
+}
+
+TEST(SolidBodies, the_state_of_a_body_has_what_holds_it) {
+  Solid solid = chain(3);
+  SolidBody body = solid.bodies.body(1), back;
+  body.mass.held = 2;
+  body.grounded = true;
+  std::vector<double> numbers;
+  body.each_number([&](auto& n) { numbers.push_back(static_cast<double>(n)); });
+  std::size_t at = 0;
+  back.each_number([&](auto& n) { n = static_cast<std::decay_t<decltype(n)>>(numbers.at(at++)); });
+  EXPECT_EQ(at, numbers.size());
+  EXPECT_EQ(back.mass.count, 3);
+  EXPECT_EQ(back.mass.held, 2);
+  EXPECT_EQ(back.mass.mass, body.mass.mass);
+  EXPECT_TRUE(back.grounded);
+  EXPECT_EQ(numbers[8], 2.0) << "after origin, attitude and count";
+  EXPECT_EQ(numbers.back(), 1.0);
+}
+
+TEST(SolidBodies, a_member_takes_14_bytes) {
+  SolidBodies bodies;
+  bodies.found(SolidBody());
+  double sum = 0, weights = 0;
+  for (int tag = 1; tag <= 300000; ++tag) {
+    bodies.take_in(tag, 1);
+    if (tag < 1000) continue;
+    sum += static_cast<double>(bodies.member_bytes()) / tag * std::log1p(1.0 / tag);
+    weights += std::log1p(1.0 / tag);
+  }
+  EXPECT_LE(sum / weights, 14.0);
 }
 
 // ------------------------------------------------------------------------------------------------------------- far and carved

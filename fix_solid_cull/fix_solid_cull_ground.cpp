@@ -1,0 +1,147 @@
+// Bodies that walls hold: they stand still, so that their granules at walls may go to the store too, and hand on to the walls what
+// presses on them.
+#include <mpi.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "engine_vectors.h"
+#include "fix_solid_cull.h"
+#include "group.h"
+#include "neighbor.h"
+#include "update.h"
+
+namespace solidcull {
+namespace {
+
+// looks in a row at rest before walls are taken to hold a body
+constexpr int looks_at_rest = 2;
+// what presses on a grounded body since it was locked, in its weight: beyond, the walls might not hold it, and it moves as a rigid
+// body with live contacts at the walls again
+constexpr double along_share = 0.1, against_share = 0.5;
+// interface granules that nothing holds any more go to the store at the next rebuild of the neighbour lists; for this share of
+// all atoms, at once
+constexpr double worth_of_a_build = 0.05;
+
+}  // namespace
+
+bool FixSolidCull::stands_still(int body) const { return !rigid() || bodies_.body(body).grounded; }
+
+void FixSolidCull::set_grounded(int body, bool on) {
+  SolidBody& b = bodies_.body(body);
+  if (b.grounded == on) return;
+  b.grounded = on;
+  b.changed = true;
+  b.step_then = -1;
+  b.acceleration = Vec3::Zero();
+  b.twist = {b.pose.to_world(b.mass.centre()), Vec3::Zero(), Vec3::Zero()};
+  rested_.erase(body);
+  pressed_.erase(body);
+  clear_of_walls_.erase(body);
+  locked_index_stale_ = true;
+  find_frame(body);
+}
+
+/// Bodies that stand still and have never moved share the world's frame.
+void FixSolidCull::find_frame(int body) {
+  const SolidBody& b = bodies_.body(body);
+  const bool shares = b.grounded && b.pose == Pose();
+  if (!shares && store_->frame_of(body) == GranuleStore::shared_frame) clear_of_walls_.erase(body);
+  store_->share(body, shares);
+}
+
+void FixSolidCull::forget_body(int body) {
+  store_->forget(body);
+  rested_.erase(body);
+  pressed_.erase(body);
+  stored_change_.erase(body);
+  clear_of_walls_.erase(body);
+}
+
+void FixSolidCull::ground_bodies() {
+  if (!sleeping() || !rigid()) return;
+  // over all ranks a body that spans them is one: which of its parts touch walls
+  std::set<int> spanning_held;
+  if (comm->nprocs > 1) {
+    std::vector<double> keys;
+    for (const auto& [number, body] : bodies_.bodies())
+      if (body.mass.held > 0 && std::binary_search(spanning_.begin(), spanning_.end(), key_of(number))) keys.push_back(key_of(number));
+    for (const double key : halo_.gather_all(keys)) spanning_held.insert(static_cast<int>(key));
+  }
+  const Vec3 g = gravity();
+  const Vec3 down = g.norm() > 0 ? Vec3(g.normalized()) : Vec3(Vec3::Zero());
+  const double slow = SolidStateLaw::drift_share * solid_state_.speed;
+  for (auto& [number, body] : bodies_.bodies()) {
+    const bool held = body.mass.held > 0 || spanning_held.count(key_of(number));
+    if (body.grounded) {
+      const Sum* mean = pressed_.find(number);
+      const Vec3* p = mean ? &mean->value : nullptr;
+      if (!p && held) continue;
+      const double weight = body.motion.mass() * weight_scale_, along = p ? p->dot(down) : 0.0;
+      const bool holds =
+          !p || (-along < against_share * weight && (*p - along * down).norm() < along_share * (weight + std::max(0.0, along)));
+      if (!held || !holds) lifting_.insert(number);  // when its granules at walls can come back
+      continue;
+    }
+    const double size = std::cbrt(static_cast<double>(body.mass.count)) * diameter_;
+    const bool at_rest = held && body.twist.at(body.pose.to_world(body.mass.centre())).norm() + body.twist.spin.norm() * size < slow;
+    if (!at_rest) {
+      rested_.erase(number);
+      continue;
+    }
+    if (++rested_[number] < looks_at_rest) continue;
+    set_grounded(number, true);
+  }
+  if (any_rank(locked_index_stale_)) {
+    settle_bodies();
+    refresh_locked();
+    give_velocities();
+  }
+  share_out_loads();
+  // interface granules that might go to the store, but for those that something was near to the last time
+  std::size_t may_go = 0;
+  for (const int i : locked_index_) may_go += may_leave_its_walls(shell_[i]);
+  const double gain = static_cast<double>(may_go) - static_cast<double>(stay_near_);
+  if (any_rank(!lifting_.empty() || gain > std::max(worth_of_a_build * atom->nlocal, 10.0)))
+    ask_for_build(update->ntimestep + 1);
+}
+
+void FixSolidCull::share_out_loads() {
+  // which elements bear what presses on a body: those that bear the body
+  std::vector<double> weights(spanning_.size(), 0.0);
+  std::vector<std::pair<const ActiveBody*, double>> sums;
+  for (const ActiveBody& a : active_) {
+    const Sum* p = a.stands ? pressed_.find(a.number) : nullptr;
+    if (!p) continue;
+    sums.emplace_back(&a, wall_loads_.weigh(a.number, p->value));
+    if (a.spanning >= 0) weights[a.spanning] += sums.back().second;
+  }
+  if (!weights.empty()) MPI_Allreduce(MPI_IN_PLACE, weights.data(), static_cast<int>(weights.size()), MPI_DOUBLE, MPI_SUM, world);
+  for (const auto& [a, sum] : sums) wall_loads_.share_out(a->number, a->spanning >= 0 ? weights[a->spanning] : sum);
+}
+
+void FixSolidCull::press_on_walls() {
+  // a body that stands still in spite of a load hands it on to the walls that hold it
+  FlatMap<const Vec3*> change;
+  for (const ActiveBody& a : active_) {
+    if (!a.stands) continue;
+    Vec3& mean = pressed_[a.number].value;
+    mean += (a.change - mean) / look_every_;
+    change[a.number] = &a.change;
+  }
+  wall_loads_.for_each([&](int body, int mesh, int element, const FrozenWallLoads::Element& e) {
+    Vec3 force = -e.force, torque = -e.torque;
+    const Vec3* const* more = e.share > 0 ? change.find(body) : nullptr;
+    if (more) {  // where the element bears its own load
+      const Vec3 extra = e.share * **more, at = e.force.cross(e.torque) / e.force.squaredNorm();
+      force += extra;
+      torque += at.cross(extra);
+    }
+    mesh_loads_.press(mesh, element, force, torque);
+  });
+}
+
+}  // namespace solidcull

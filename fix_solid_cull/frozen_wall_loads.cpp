@@ -1,0 +1,98 @@
+#include "frozen_wall_loads.h"
+
+#include <algorithm>
+
+namespace solidcull {
+
+void FrozenWallLoads::book(int body, const WallLoad& load, int sign) {
+  auto& elements = bodies_[body];
+  Element& e = elements[{load.mesh, load.element}];
+  e.granules += sign;
+  e.force += sign * load.force;
+  e.torque += sign * load.torque;
+  if (e.granules == 0) elements.erase({load.mesh, load.element});  // with it what rounding has left
+  if (elements.empty()) bodies_.erase(body);
+}
+
+void FrozenWallLoads::add(std::int64_t tag, int body, const std::vector<WallLoad>& loads) {
+  for (const WallLoad& load : loads) {
+    int e = free_;
+    if (e == none) {
+      e = static_cast<int>(entries_.size());
+      entries_.emplace_back();
+    } else {
+      free_ = entries_[e].next;
+    }
+    int* head = heads_.find(tag);
+    entries_[e] = {load, head ? *head : none};
+    heads_[tag] = e;
+    book(body, load, +1);
+  }
+}
+
+void FrozenWallLoads::erase(std::int64_t tag, int body) {
+  const int* head = heads_.find(tag);
+  if (!head) return;
+  for (int e = *head; e != none;) {
+    book(body, entries_[e].load, -1);
+    const int next = entries_[e].next;
+    entries_[e].next = free_;
+    free_ = e;
+    e = next;
+  }
+  heads_.erase(tag);
+}
+
+void FrozenWallLoads::move(std::int64_t tag, int from, int to) {
+  const int* head = heads_.find(tag);
+  if (!head || from == to) return;
+  for (int e = *head; e != none; e = entries_[e].next) {
+    book(from, entries_[e].load, -1);
+    book(to, entries_[e].load, +1);
+  }
+}
+
+void FrozenWallLoads::merge(int swallowed, int kept) {
+  const auto from = bodies_.find(swallowed);
+  if (from == bodies_.end()) return;
+  auto& to = bodies_[kept];
+  for (const auto& element : from->second) {
+    Element& e = to[element.first];
+    e.granules += element.second.granules;
+    e.force += element.second.force;
+    e.torque += element.second.torque;
+  }
+  bodies_.erase(swallowed);
+}
+
+void FrozenWallLoads::clear() { *this = FrozenWallLoads(); }
+
+Vec3 FrozenWallLoads::force(int body) const {
+  Vec3 sum = Vec3::Zero();
+  const auto found = bodies_.find(body);
+  if (found != bodies_.end())
+    for (const auto& e : found->second) sum += e.second.force;
+  return sum;
+}
+
+double FrozenWallLoads::weigh(int body, const Vec3& load) {
+  double sum = 0;
+  const auto found = bodies_.find(body);
+  if (found == bodies_.end()) return sum;
+  for (auto& e : found->second) sum += e.second.share = std::max(0.0, -e.second.force.dot(load));
+  return sum;
+}
+
+void FrozenWallLoads::share_out(int body, double sum) {
+  const auto found = bodies_.find(body);
+  if (found == bodies_.end()) return;
+  for (auto& e : found->second) e.second.share = sum > 0 ? e.second.share / sum : 0.0;
+}
+
+std::size_t FrozenWallLoads::memory_bytes() const {
+  std::size_t bytes = entries_.capacity() * sizeof(Entry) + heads_.memory_bytes();
+  for (const auto& body : bodies_) bytes += body.second.size() * (sizeof(Element) + sizeof(Place) + 32);
+  return bytes;
+}
+
+}  // namespace solidcull

@@ -1,0 +1,480 @@
+#!/usr/bin/python3
+"""One impact on ever larger beds: what a granule that rests costs, culled, unculled, and frozen by hand.
+
+    validation/scale/scale.py [--sizes 20k,160k,1.28M] [--only unculled,culled,control] [--runs n] [--idle] [--few-steps]
+
+Makes the beds that are missing (out/bed-SIZE.restart), then runs each size unculled (impact.in without its fix line), culled
+(impact.in) and by hand (control.in), in turns, each on one core, and prints run times, parts, memory and errors. Every run is
+kept in out/runs/; a run that is there, made of the same decks, bed and (culled) launcher, is not repeated, so that an
+interrupted series goes on where it stopped. All figures: out/scale.json, table out/scale.txt, plot out/scale.png.
+`--idle`: no ball, nothing moves. `--few-steps`: tiny beds, a few steps, no bars. `--table`: runs nothing, prints what is there.
+Exit: 0 all runs there and no granule lost, 1 else, 2 a run failed.
+"""
+import argparse
+import hashlib
+import importlib.util
+import json
+import os
+import re
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent)]
+import numpy as np  # noqa: E402
+import tiles        # noqa: E402
+import twin         # noqa: E402
+
+
+def load(name, file):
+    spec = importlib.util.spec_from_file_location(name, file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+example = load("impact_example", HERE.parents[1] / "examples" / "impact" / "example.py")  # how it measures the crater
+
+OUT = HERE / "out"
+LAUNCHER = os.environ.get("SOLIDCULL_LAUNCHER")  # default: as twin finds it
+BALL = 0.006                   # m: radius
+FALL = 0.00224                 # m: what the ball of examples/impact falls before it touches a granule
+SHIFTS = (0, 2.6e-8, -2.6e-8, 5.2e-8, -5.2e-8)  # m: the ball's x in each run, 1e-5 granule diameters apart
+PERIOD, GRANULES, TOP = 0.075, 20000, 0.12       # m, of the tile; m: height of the box
+MARGIN = tiles.GRANULE         # m: the sides stand as far outside of the tiles: no granule overlaps them
+ELEMENT = 0.0375               # m: edge of the floor's triangles
+SAMPLE = 0.5                   # s between two looks at the memory
+KINDS = ("unculled", "culled", "control")
+
+# name: tiles in x and y, the bed that it is laid of (none: of the tile itself), steps damped, then how often at most stopped and left free for how long
+BEDS = {"20k": ((1, 1), None, 12000, 10, 1000), "base": ((3, 3), None, 5000, 4, 300),
+        "rested": ((3, 3), "base", 6000, 6, 500), "160k": ((4, 2), "rested", 2500, 10, 250), "1.28M": ((8, 8), "rested", 1000, 5, 250)}
+FEW_BEDS = {"tiny": ((1, 1), None, 500, 2, 50), "few-base": ((3, 3), None, 150, 2, 20), "small": ((4, 2), "few-base", 50, 2, 20)}
+FEW = {"PERIOD": 0.015, "GRANULES": 700, "BEDS": FEW_BEDS, "OUT": OUT / "few"}
+FEW_TILE = {"poursteps": 3000, "dampsteps": 1500, "freesteps": 100}
+HELPERS = ("base", "rested")      # beds that others are laid of, not sizes
+few_steps = False
+
+
+# --- beds -----------------------------------------------------------------------------------------------------------
+
+def text_of(*files):
+    """Decks without comments and empty lines: what a kept result depends on."""
+    lines = "\n".join((HERE / f).read_text() for f in files).splitlines()
+    return "\n".join(" ".join(words) for words in map(twin.words_of, lines) if words)
+
+
+def sides_of(copies):
+    return [round(n * PERIOD + 2 * MARGIN, 9) for n in copies]
+
+
+def made(file, recipe, make):
+    """The file, made unless it is there, made of the same. `make(part)` writes it."""
+    note = file.with_suffix(".recipe")
+    if not (file.exists() and note.exists() and note.read_text() == recipe):
+        print(f"  making {file.name}", flush=True)
+        part = file.with_suffix(".part")
+        make(part)
+        part.rename(file)
+        note.write_text(recipe)
+    return file
+
+
+def engine(deck, log, variables):
+    return twin.run_liggghts(twin.find_launcher(LAUNCHER), HERE / deck, HERE, log, variables)
+
+
+def tile():
+    """The settled tile, periodic in x and y."""
+    variables = {"P": PERIOD, "granules": GRANULES, **(FEW_TILE if few_steps else {})}
+    return made(OUT / "tile.restart", json.dumps(variables) + text_of("tile.in", "material.in"),
+                lambda part: engine("tile.in", OUT / "tile.log", {**variables, "restart": part}))
+
+
+def write_floor(file, sides):
+    """The floor as a regular grid of triangles, in rows along y, two a square: element 2 (i ny + j) is the lower right one."""
+    edge = 2 * MARGIN  # how far it reaches beyond the sides
+    n = [max(1, round((s + 2 * edge) / ELEMENT)) for s in sides]
+    x, y = (np.linspace(-edge, s + edge, k + 1) for s, k in zip(sides, n))
+    with open(file, "w") as f:
+        f.write("solid floor\n")
+        for i in range(n[0]):
+            for j in range(n[1]):
+                a, b, c, d = (x[i], y[j]), (x[i + 1], y[j]), (x[i + 1], y[j + 1]), (x[i], y[j + 1])
+                for corners in ((a, b, c), (a, c, d)):
+                    f.write("facet normal 0 0 1\nouter loop\n" + "".join(f"vertex {u:.9g} {v:.9g} 0\n" for u, v in corners)
+                            + "endloop\nendfacet\n")
+        f.write("endsolid floor\n")
+
+
+def bed(name):
+    """The bed at rest: files restart, floor, granules (.npy), and its recipe's hash."""
+    copies, source, damp, stills, free = BEDS[name]
+    sides, floor, granules = sides_of(copies), OUT / f"floor-{name}.stl", OUT / f"bed-{name}.npy"
+    source_file = bed(source)["restart"] if source else tile()
+    variables = {"L": sides[0], "W": sides[1], "dampsteps": damp, "stills": stills, "freesteps": free}
+    recipe = json.dumps([variables, copies, ELEMENT, TOP]) + text_of("relax.in", "material.in", "bed.in") + (HERE / "tiles.py").read_text() \
+        + source_file.with_suffix(".recipe").read_text()
+
+    def make(part):
+        laid, dump = OUT / f"tiles-{name}.part", OUT / f"bed-{name}.dump"
+        write_floor(floor, sides)
+        # the middle of the bed is to be the middle of the tile that was poured, whatever the number of tiles
+        of = tiles.Bed(source_file, BEDS[source][0], PERIOD, MARGIN, False) if source else \
+            tiles.Bed(source_file, (1, 1), PERIOD, 0, copies != (1, 1))
+        tiles.lay(of, laid, copies, PERIOD, MARGIN, TOP)
+        began = time.monotonic()
+        log = engine("relax.in", OUT / f"bed-{name}.log", {**variables, "floormesh": floor, "tiles": laid, "dump": dump, "restart": part})
+        laid.unlink()
+        np.save(granules, twin.read_final(dump))
+        dump.unlink()
+        rows = [r for t in twin.parse_log(log) for r in [dict(zip(t.columns, t.rows[-1]))]]
+        print(f"  {name}: {rows[-1]['Atoms']:,.0f} granules, kinetic energy {rows[-1]['KinEng']:.3g} J, fastest "
+              f"{1e3 * rows[-1]['fastest']:.3g} mm/s; {time.monotonic() - began:.0f} s", flush=True)
+
+    restart = made(OUT / f"bed-{name}.restart", recipe, make)
+    return {"restart": restart, "floor": floor, "granules": granules, "sides": sides, "hash": hashlib.sha1(recipe.encode()).hexdigest()}
+
+
+def first_touch(granules, x, y):
+    """Height (m) at which the centre of a ball that falls along z touches its first granule."""
+    d2 = (granules["x"] - x)**2 + (granules["y"] - y)**2
+    below = d2 < (BALL + granules["radius"])**2
+    return float((granules["z"][below] + np.sqrt((BALL + granules["radius"][below])**2 - d2[below])).max())
+
+
+# --- runs -----------------------------------------------------------------------------------------------------------
+
+def busy_seconds():
+    """What all cores of the machine have worked so far (s)."""
+    words = [int(w) for w in Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:]]
+    return (words[0] + words[1] + words[2] + words[5] + words[6]) / os.sysconf("SC_CLK_TCK")
+
+
+def memory_of(pid):
+    """VmRSS and VmHWM (MB), or none when the process has ended."""
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return None
+    sizes = [re.search(rf"{key}:\s+(\d+)", status) for key in ("VmRSS", "VmHWM")]
+    return [int(s[1]) / 1024 for s in sizes] if all(sizes) else None
+
+
+def run_engine(deck, log, variables):
+    """Runs a deck and watches it: the text of its log, and the figures of the process."""
+    command = [twin.find_launcher(LAUNCHER), "-in", str(deck), "-log", str(log), "-echo", "log"]
+    for name, value in variables.items():
+        command += ["-var", name, str(value)]
+    samples, began, busy, before = [], time.monotonic(), busy_seconds(), os.times()
+    with open(log.with_suffix(".screen"), "w") as f:  # the log is flushed at each row, the screen is not
+        process = subprocess.Popen(command, cwd=HERE, env=twin.environment(), stdin=subprocess.DEVNULL, stdout=f, stderr=subprocess.STDOUT)
+        try:
+            while process.poll() is None:
+                now = memory_of(process.pid)
+                if now and (not samples or time.monotonic() - began - samples[-1][0] > SAMPLE):
+                    samples.append([round(time.monotonic() - began, 2), *now])
+                try:
+                    process.wait(SAMPLE / 2)
+                except subprocess.TimeoutExpired:
+                    pass
+        finally:
+            if process.poll() is None:
+                process.kill()
+    wall = time.monotonic() - began
+    after = os.times()
+    own = after.children_user + after.children_system - before.children_user - before.children_system
+    text = log.read_text(errors="replace") if log.exists() else ""
+    if process.returncode:
+        said = twin.error_in(text + log.with_suffix(".screen").read_text(errors="replace"))
+        raise twin.TwinError(f"{log.stem}: LIGGGHTS stopped with status {process.returncode}: {said} (all of it: {log}, .screen)")
+    thinned = samples[::max(1, len(samples) // 500)]
+    return text, {"wall": wall, "others_busy": max(0.0, (busy_seconds() - busy - own) / wall), "memory": thinned,
+                  "peak_mb": max((s[2] for s in samples), default=0), "cpu": own}
+
+
+def deck_of(scene, kind):
+    """The lines of one run's deck; what hangs on the fix is left out of an unculled one."""
+    if kind == "control":
+        return twin.read_deck(HERE / "control.in") + twin.end_of_deck("${final}")
+    lines = twin.make_deck(twin.read_deck(HERE / f"{scene}.in"), "cull", kind == "culled", None, "${base}")
+    lines = [line for line in lines if "twin_counts" not in line]
+    return [line.replace("${base}.final", "${final}") for line in lines]
+
+
+def sha1(file):
+    return hashlib.sha1(Path(file).read_bytes()).hexdigest()
+
+
+def window(granules, sides):
+    """The granules of the square of example.BOX around the middle, moved to where the bed of examples/impact is."""
+    near = np.ones(len(granules), dtype=bool)
+    for axis, side in zip("xy", sides):
+        near &= abs(granules[axis] - side / 2) < example.BOX / 2
+    granules = granules[near]
+    for axis, side in zip("xy", sides):
+        granules[axis] -= side / 2 - example.BOX / 2
+    return granules
+
+
+def crater(before, after, sides):
+    """Volume (m^3) that the surface around the middle has lost and gained."""
+    change = example.surface(window(after, sides)) - example.surface(window(before, sides))
+    return float(-change[change < 0].sum() * example.CELL**2), float(change[change > 0].sum() * example.CELL**2)
+
+
+def element_loads(file):
+    """Normal load (N) on each element of the floor, by its number, of a mesh/vtk dump with `id stress`: every triangle has its own
+    three points there, in its own order."""
+    def values(heading):
+        return np.array(re.search(heading + r"[^\n]*\n([-+.\deE\s]+)", text)[1].split(), dtype=float)
+    text = Path(file).read_text()
+    corner = values("POINTS").reshape(-1, 3, 3)
+    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
+    return (values("normal_stress_average") * area)[np.argsort(values("meshid"))]
+
+
+def figures_of(scene, kind, text, made_bed, final, loads):
+    """What is compared, and what a culled run says of itself."""
+    main = max((t for t in twin.parse_log(text) if t.loop_time is not None), key=lambda t: len(t.rows))
+    columns = {c: np.array([row[k] for row in main.rows]) for k, c in enumerate(main.columns)}
+    granules, before = twin.read_final(final), np.load(made_bed["granules"])
+    moved = granules[granules["id"] <= len(before)]
+    floor = columns["floor"][1:]  # the row before the first step counts the mesh's load twice
+    figures = {"loop_time": main.loop_time, "steps": int(columns["Step"][-1] - columns["Step"][0]), "granules": len(granules),
+               "mass": float(granules["mass"].sum()), "ids": hashlib.sha1(granules["id"].astype(np.int64).tobytes()).hexdigest()}
+    if scene == "impact":
+        lost, gained = crater(before, granules, made_bed["sides"])
+        figures["metrics"] = {
+            "depth, end (m)": columns["depth"][-1], "depth, largest (m)": columns["depth"].max(),
+            "force on ball, largest (N)": columns["force"].max(), "floor load, largest rise (N)": floor.max() - floor[0],
+            "floor load, end (N)": floor[-1], "kinetic energy, largest (J)": columns["bedke"].max(),
+            "crater volume (m3)": lost, "heap volume (m3)": gained}
+        if loads.exists():
+            figures["element_loads"] = [round(float(x), 7) for x in element_loads(loads)]
+    else:
+        drift = np.sqrt(sum((moved[c] - before[c])**2 for c in "xyz"))
+        figures["metrics"] = {"kinetic energy, largest (J)": columns["bedke"].max(), "floor load, end (N)": floor[-1],
+                              "largest displacement (m)": drift.max()}
+    figures["metrics"] = {name: float(value) for name, value in figures["metrics"].items()}
+    if kind == "culled":
+        figures.update({name: float(columns[f"cull[{k}]"].mean()) for k, name in enumerate(("exterior", "interface", "interior", "bodies"), 1)})
+        figures["exterior_rows"] = [columns["Step"].astype(int).tolist(), columns["cull[1]"].astype(int).tolist()]
+        figures["said"] = re.findall(r"^fix cull solid/cull: (.*)$", text, re.M)[-2:]
+        parts = re.search(r"in the fix since it was made: (.*)$", figures["said"][-1]) if figures["said"] else None
+        figures["parts"] = {name: float(value) for name, value in (w.rsplit(" ", 1) for w in parts[1].split(", "))} if parts else {}
+        figures["seconds"] = sum(figures["parts"].values())
+    return figures
+
+
+def one_run(scene, size, kind, k, settings):
+    """The figures of a run: kept ones, when they are of the same decks, bed and launcher; else it runs."""
+    made_bed = bed(size)
+    place = OUT / "runs"
+    place.mkdir(exist_ok=True)
+    name = "-".join([scene, size, kind, str(k + 1)])
+    kept, deck, final = place / f"{name}.json", place / f"{name}.in", place / f"{name}.final"
+    elements = place / f"{name}-floor-*.vtk"
+    copies = BEDS[size][0]
+    variables = {"granules": GRANULES * copies[0] * copies[1], "L": made_bed["sides"][0], "W": made_bed["sides"][1],
+                 **({"steps": settings.steps} if settings.steps else {})}
+    if scene == "impact":
+        before = np.load(made_bed["granules"])
+        touch = first_touch(before, made_bed["sides"][0] / 2, made_bed["sides"][1] / 2)
+        steps = settings.steps or 8000
+        variables.update(dx=SHIFTS[k], z=f"{touch + FALL:.12g}", top=f"{before['z'].max():.12g}", every=steps // 2)
+    if kind == "control":
+        variables["reach"] = settings.reach
+    if kind == "culled":
+        variables["culling"] = settings.culling
+    lines = deck_of(scene, kind)
+    words = "\n".join(" ".join(w) for w in map(twin.words_of, lines) if w)
+    recipe = hashlib.sha1(json.dumps([words, text_of("scene.in", "ball.in", "material.in", "bed.in"), variables, made_bed["hash"],
+                                      sha1(twin.find_launcher(LAUNCHER)) if kind == "culled" else ""]).encode()).hexdigest()
+    old = json.loads(kept.read_text()) if kept.exists() else None
+    if old and (old["recipe"] == recipe or settings.table):
+        return {**old, "stale": old["recipe"] != recipe}
+    if settings.table:
+        return None
+    deck.write_text("\n".join(lines).replace("${final}", str(final)) + "\n")  # no variable is put into quotes
+    for file in [final, *place.glob(elements.name)]:
+        file.unlink(missing_ok=True)
+    text, watched = run_engine(deck, place / f"{name}.log", {
+        **variables, "restart": made_bed["restart"], "floormesh": made_bed["floor"], "final": final, "elements": elements})
+    steps = sorted(place.glob(elements.name), key=lambda f: int(f.stem.rsplit("-", 1)[1]))
+    run = {"name": name, "scene": scene, "size": size, "kind": kind, "date": time.strftime("%Y-%m-%d %H:%M"), "recipe": recipe,
+           "variables": variables, **watched, **figures_of(scene, kind, text, made_bed, final, steps[-1] if steps else place / "none")}
+    final.unlink()
+    kept.with_suffix(".part").write_text(json.dumps(run) + "\n")
+    kept.with_suffix(".part").rename(kept)
+    print(f"  {name}: {run['loop_time']:.1f} s, peak {run['peak_mb']:.0f} MB", flush=True)
+    return {**run, "stale": False}
+
+
+# --- the comparison -------------------------------------------------------------------------------------------------
+
+def steady_mb(run):
+    """Memory (MB) in the second half of a run."""
+    rows = [m for t, m, _ in run["memory"] if t > run["wall"] / 2] or [run["peak_mb"]]
+    return statistics.median(rows)
+
+
+def summary(runs):
+    first = runs[0]
+    result = {"runs": [r["name"] for r in runs], "loop_times": [r["loop_time"] for r in runs],
+              "loop_time": statistics.median(r["loop_time"] for r in runs), "steps": first["steps"], "granules": first["granules"],
+              "peak_mb": max(r["peak_mb"] for r in runs), "steady_mb": statistics.median(map(steady_mb, runs))}
+    result["granule_steps_per_s"] = first["granules"] * first["steps"] / result["loop_time"]
+    if "exterior" in first:
+        for name in ("exterior", "interface", "interior", "seconds"):
+            result[name] = statistics.fmean(r[name] for r in runs)
+        result["parts"] = {name: statistics.fmean(r["parts"].get(name, 0.0) for r in runs) for name in first["parts"]}
+        result["said"] = first["said"]
+    return result
+
+
+def compared(runs, kind):
+    """Speed-up and errors of one kind against the unculled runs."""
+    unculled, own = runs["unculled"], runs[kind]
+    result = {"speed_up": statistics.median(r["loop_time"] for r in unculled) / max(1e-9, statistics.median(r["loop_time"] for r in own))}
+    if kind == "culled":
+        result["over_exterior"] = unculled[0]["granules"] / statistics.fmean(r["exterior"] for r in own)
+        result["efficiency"] = result["speed_up"] / result["over_exterior"]
+    result["lost"] = max((unculled[0]["granules"] - r["granules"] for r in own), key=abs)
+    result["ids_good"] = all(r["ids"] == unculled[0]["ids"] for r in own)
+    result["metrics"] = {}
+    for name in unculled[0]["metrics"]:
+        a, b = [r["metrics"][name] for r in unculled], [r["metrics"][name] for r in own]
+        mean, spread = statistics.fmean(a), max(a) - min(a) if len(a) >= 3 else None
+        error, margin = abs(statistics.fmean(b) - mean), max(0.02 * abs(mean), spread or 0.0)
+        result["metrics"][name] = {"unculled": a, kind: b, "mean": mean, "noise_floor": spread, "error": error, "margin": margin,
+                                   "good": error <= margin}
+    if all("element_loads" in r for r in unculled + own):
+        a, b = (np.mean([r["element_loads"] for r in rs], axis=0) for rs in (unculled, own))
+        result["element_loads"] = {"largest difference (N)": float(abs(a - b).max()), "mean load (N)": float(a.mean()),
+                                   "largest load (N)": float(a.max())}
+    return result
+
+
+def table(report):
+    lines = [f"{'size':>6} {'kind':>9} {'runs':>4} {'loop (s)':>10} {'speed-up':>8} {'N / exterior':>12} {'efficiency':>10} "
+             f"{'M granule-steps/s':>17} {'peak (kB/granule)':>17} {'steady':>7}"]
+    for size, of_size in report.items():
+        for kind, s in of_size["kinds"].items():
+            c = of_size["against"].get(kind, {})
+
+            def cell(key, width, form):
+                return f"{format(c[key], form) if key in c else '-':>{width}}"
+            lines.append(f"{size:>6} {kind:>9} {len(s['runs']):>4} {s['loop_time']:>10.1f} {cell('speed_up', 8, '.2f')} "
+                         f"{cell('over_exterior', 12, '.1f')} {cell('efficiency', 10, '.2f')} {s['granule_steps_per_s'] / 1e6:>17.2f} "
+                         f"{1024 * s['peak_mb'] / s['granules']:>17.2f} {1024 * s['steady_mb'] / s['granules']:>7.2f}")
+    for size, of_size in report.items():
+        for kind, c in of_size["against"].items():
+            lines += ["", f"{size} {kind}: granules lost {c['lost']}, ids {'as unculled' if c['ids_good'] else 'NOT AS UNCULLED'}"]
+            lines.append(f"  {'metric':30} {'unculled':>12} {'error':>9} {'noise floor':>11} {'margin':>8}")
+            for name, m in c["metrics"].items():
+                floor = "-" if m["noise_floor"] is None else twin.percent(m["noise_floor"], m["mean"])
+                lines.append(f"  {name:30} {m['mean']:12.6g} {twin.percent(m['error'], m['mean']):>9} {floor:>11} "
+                             f"{twin.percent(m['margin'], m['mean']):>8} {'good' if m['good'] else 'OUTSIDE'}")
+            if "element_loads" in c:
+                lines.append("  load on an element of the floor: " + ", ".join(f"{k} {v:.4g}" for k, v in c["element_loads"].items()))
+        culled = of_size["kinds"].get("culled")
+        if culled:
+            lines += [f"  {line}" for line in culled["said"]]
+        for kind in of_size["kinds"]:
+            lines += [f"  {note}" for note in of_size["notes"][kind]]
+    return "\n".join(lines)
+
+
+def note(run):
+    others = "alone" if run["others_busy"] < 0.1 else f"beside others that kept {run['others_busy']:.1f} cores busy"
+    if run["cpu"] < 0.97 * run["wall"]:
+        others += f"; it had a core for only {100 * run['cpu'] / run['wall']:.0f} % of the time"
+    return f"{run['name']}: {run['date']}, {run['loop_time']:.1f} s, {others}{'; OF OTHER DECKS OR ANOTHER LAUNCHER' if run['stale'] else ''}"
+
+
+def plot(report, file):
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    fig, ax = plt.subplots(figsize=(6, 4.5))
+    for kind, style in (("unculled", "o-"), ("culled", "s-"), ("control", "^--")):
+        points = [(s["granules"], s["loop_time"]) for r in report.values() for k, s in r["kinds"].items() if k == kind]
+        if points:
+            ax.loglog(*zip(*points), style, label="frozen by hand" if kind == "control" else kind)
+    ax.set(xlabel="granules", ylabel="loop time (s)")
+    ax.legend()
+    ax.grid(alpha=0.3, which="both")
+    fig.tight_layout()
+    fig.savefig(file, dpi=120)
+    plt.close(fig)
+
+
+def main(argv=None):
+    global few_steps
+    p = argparse.ArgumentParser(prog="scale.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    p.add_argument("--sizes", help="default: all that BEDS has: 20k,160k,1.28M")
+    p.add_argument("--only", default="", help="unculled, culled or control, or several; default all (--idle: no control)")
+    p.add_argument("--runs", type=int, default=1, help=f"of each kind, 1 to {len(SHIFTS)}; three unculled give the noise floor")
+    p.add_argument("--culling", default="exterior sleep", help="the keywords of the fix")
+    p.add_argument("--reach", type=float, default=0.04, help="m: what the control lets move around the impact")
+    p.add_argument("--steps", type=int, help="default: 8000, --idle 10000")
+    p.add_argument("--idle", action="store_true")
+    p.add_argument("--beds", action="store_true", help="makes the beds, runs nothing")
+    p.add_argument("--table", action="store_true")
+    p.add_argument("--few-steps", action="store_true")
+    settings = p.parse_args(argv)
+    few_steps = settings.few_steps
+    if few_steps:
+        globals().update(FEW)
+        settings.steps = settings.steps or 120  # the ball touches after some 50
+    sizes = settings.sizes.split(",") if settings.sizes else [b for b in BEDS if not b.endswith(HELPERS)]
+    kinds = [k for k in KINDS if k in (settings.only or ",".join(KINDS)).split(",") and not (settings.idle and k == "control")]
+    if unknown := [s for s in sizes if s not in BEDS] or [k for k in settings.only.split(",") if k and k not in KINDS]:
+        p.error(f"unknown: {', '.join(unknown)}; sizes are {', '.join(BEDS)}, kinds {', '.join(KINDS)}")
+    if not 1 <= settings.runs <= len(SHIFTS):
+        p.error(f"--runs is 1 to {len(SHIFTS)}")
+    OUT.mkdir(parents=True, exist_ok=True)
+    scene = "idle" if settings.idle else "impact"
+    report = {}
+    for size in sizes:
+        if settings.table and not (OUT / f"bed-{size}.restart").exists():
+            continue
+        bed(size)
+        if settings.beds:
+            continue
+        print(f"=== {size}, {scene}", flush=True)
+        # unculled runs that are there are compared with, whatever this call runs
+        runs = {kind: [] for kind in KINDS}
+        for k in range(settings.runs):
+            for kind in kinds:
+                run = one_run(scene, size, kind, k, settings)
+                runs[kind] += [run] if run else []
+        for kind in set(KINDS) - set(kinds):
+            keep = argparse.Namespace(**{**vars(settings), "table": True})
+            runs[kind] = [r for k in range(len(SHIFTS)) if not (scene == "idle" and kind == "control") if (r := one_run(scene, size, kind, k, keep))]
+        there = [kind for kind in KINDS if runs[kind]]
+        report[size] = {"kinds": {kind: summary(runs[kind]) for kind in there},
+                        "against": {kind: compared(runs, kind) for kind in there if kind != "unculled" and runs["unculled"]},
+                        "notes": {kind: [note(r) for r in runs[kind]] for kind in there}}
+    if settings.beds:
+        return 0
+    name = "idle" if settings.idle else "scale"
+    (OUT / f"{name}.json").write_text(json.dumps(report, indent=1) + "\n")
+    text = table(report)
+    (OUT / f"{name}.txt").write_text(text + "\n")
+    plot(report, OUT / f"{name}.png")
+    print("\n" + text)
+    lost = any(c["lost"] or not c["ids_good"] for r in report.values() for c in r["against"].values())
+    return 1 if lost else 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except (twin.TwinError, tiles.RestartError) as e:
+        print(f"scale: {e}", file=sys.stderr)
+        sys.exit(2)
