@@ -121,6 +121,20 @@ void store_near(benchmark::State& state) {
   state.counters["seen_each"] = static_cast<double>(seen) / static_cast<double>(state.iterations());
 }
 
+/// Neighbours after each other, as a walk over the bed asks for them: what caches and TLB do to store_near is not here.
+void store_near_in_order(benchmark::State& state) {
+  const Lattice lattice(state.range(0));
+  GranuleStore store(2 * d);
+  lattice.fill(store);
+  std::int64_t seen = 0, tag = lattice.size() / 3;
+  for (auto _ : state) {
+    store.for_each_near(1, {lattice.place(tag), 0.5 * d}, 0.2 * d, [&](const Resident&) { ++seen; });
+    tag = (tag + 1) % lattice.size();
+  }
+  state.SetComplexityN(lattice.size());
+  state.counters["seen_each"] = static_cast<double>(seen) / static_cast<double>(state.iterations());
+}
+
 /// All contacts of a granule away and back again.
 void contacts_erase_and_add(benchmark::State& state) {
   const Lattice lattice(state.range(0));
@@ -193,6 +207,7 @@ BENCHMARK(store_add) OVER_SIZES->Unit(benchmark::kMillisecond);
 BENCHMARK(store_take_and_add) OVER_SIZES->Complexity();
 BENCHMARK(store_find) OVER_SIZES->Complexity();
 BENCHMARK(store_near) OVER_SIZES->Complexity();
+BENCHMARK(store_near_in_order) OVER_SIZES->Complexity();
 BENCHMARK(contacts_erase_and_add) OVER_SIZES->Complexity();
 BENCHMARK(bodies_lock) OVER_SIZES->Unit(benchmark::kMillisecond);
 BENCHMARK(carve_and_split) OVER_SIZES->Unit(benchmark::kMicrosecond)->Complexity();

@@ -20,8 +20,8 @@
 namespace solidcull {
 namespace {
 
-constexpr int worth_the_trouble = 50000;  // atoms
-constexpr int room = 3;                   // times the atoms that are left
+constexpr int worth_the_trouble = 30000;  // atoms
+constexpr int room = 2;                   // times the atoms that are left
 
 }  // namespace
 

@@ -309,6 +309,20 @@ double FixSolidCull::max_rad(int type) {
   return type >= 0 && type < static_cast<int>(largest_radius_by_type_.size()) ? largest_radius_by_type_[type] : 0.0;
 }
 
+// the engine makes the tables of its contact models for the types that it sees among its atoms and that fixes name: a run may
+// start with all granules of a type in the store
+int FixSolidCull::min_type() {
+  for (std::size_t type = 1; type < largest_radius_by_type_.size(); ++type)
+    if (largest_radius_by_type_[type] > 0) return static_cast<int>(type);
+  return 0;
+}
+
+int FixSolidCull::max_type() {
+  for (std::size_t type = largest_radius_by_type_.size(); type-- > 1;)
+    if (largest_radius_by_type_[type] > 0) return static_cast<int>(type);
+  return 0;
+}
+
 void FixSolidCull::setup_pre_exchange() {
   find_scales();
   if (!store_) {
@@ -347,6 +361,7 @@ void FixSolidCull::pre_initial_integrate() {
   }
   no_cull_until_ = -1;
   worth_ = WorthWatch();
+  told_no_worth_ = false;
 }
 
 // ------------------------------------------------------------------------------------------------------------ the time step
@@ -413,7 +428,8 @@ void FixSolidCull::check_invariants() {
   store_->for_each([&](const Resident& r) {
     const StoredGranule g = store_->get(r.tag);
     if (g.body != bodies_.body_of(g.tag)) broken("interior granule " + std::to_string(g.tag) + " lies in the wrong body");
-    if (store_->frame_of(g.body) == GranuleStore::shared_frame && !(bodies_.body(g.body).grounded && bodies_.pose(g.body) == Pose()))
+    if (store_->frame_of(g.body) == GranuleStore::shared_frame &&
+        !(bodies_.body(g.body).grounded && bodies_.pose(g.body) == Pose()))
       broken("body " + std::to_string(g.body) + " moves and lies among those that stand still");
     sums[g.body].add(g.mass, g.position, g.radius, +1, g.held);
   });

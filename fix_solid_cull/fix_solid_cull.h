@@ -65,6 +65,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   double compute_vector(int n) override;
   double memory_usage() override;
   double max_rad(int type) override;
+  int min_type() override;
+  int max_type() override;
 
   void grow_arrays(int nmax) override;
   void copy_arrays(int from, int to, int) override;
@@ -116,8 +118,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   struct ActiveBody {
     int number;
     SolidBody* body;
-    bool stands = false;               // grounded, or all bodies are fixed
-    Vec3 change = Vec3::Zero();        // of the load on its interface granules since they were locked (N)
+    bool stands = false;                               // grounded, or all bodies are fixed
+    Vec3 change = Vec3::Zero();                        // of the load on its interface granules since they were locked (N)
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // N and N m about the centre of mass, of the whole body
     double reach = 0,
            way = 0;  // of its interior granules: farthest from the centre; bound of their way since the last reneighbouring (m)
@@ -142,6 +144,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void follow_loads(int swallowed, int kept);
   void settle_bodies();
   void adopt_places();
+  std::vector<std::int64_t> stored_at_borders() const;
   void group_bodies();
   int key_of(int body) const;
   int key_of_atom(int i) const;  // owned or ghost; 0: exterior
@@ -162,7 +165,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
     return frame == GranuleStore::shared_frame ? world : bodies_.pose(frame);
   }
 
-  /// Stored granules whose surface is closer than `gap` to the sphere's (world frame), but for those of the body `except` (a key).
+  /// Stored granules whose surface is closer than `gap` to the sphere's (world frame), but for those of the body `except` (a
+  /// key).
   template <class Visit>
   void for_each_stored_near(const Sphere& s, double gap, Visit visit, int except = 0) const {
     store_->for_each_frame([&](int frame, const Vec3&, const Vec3&) {
@@ -312,14 +316,14 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::unique_ptr<GranuleStore> store_;
   FrozenContacts contacts_;
   SolidBodies bodies_;
-  FrozenWallLoads wall_loads_;     // of stored granules
+  FrozenWallLoads wall_loads_;  // of stored granules
   struct Sum {
     Vec3 value = Vec3::Zero();
   };
-  FlatMap<Sum> stored_change_;    // body -> what its stored granules carried of change of load when they went in, summed (N)
-  FlatMap<int> rested_;            // body -> looks in a row at which it was at rest at a wall that stands still
-  FlatMap<Sum> pressed_;          // grounded body -> running mean of what presses on it since it was locked (N)
-  std::set<int> lifting_;          // grounded bodies that the walls might not hold any more
+  FlatMap<Sum> stored_change_;  // body -> what its stored granules carried of change of load when they went in, summed (N)
+  FlatMap<int> rested_;         // body -> looks in a row at which it was at rest at a wall that stands still
+  FlatMap<Sum> pressed_;        // grounded body -> running mean of what presses on it since it was locked (N)
+  std::set<int> lifting_;       // grounded bodies that the walls might not hold any more
   Ledger ledger_;
   std::map<int, InterfaceMesh> meshes_;
   bool meshes_wanted_ = false;
@@ -366,12 +370,12 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::vector<Foreign> halo_foreign_;  // other ranks' and periodic images' exterior and interface granules
   std::int64_t stored_everywhere_ = 0;
   std::int64_t locked_everywhere_ = 0;
-  int store_bodies_ = 0;         // bodies on all ranks: with one alone, none can come near another
-  std::size_t stay_near_ = 0;    // interface granules that stayed atoms the last time because something is near
-  bool shell_changed_ = false;   // by granules that something came near to, or that nothing is near any more
+  int store_bodies_ = 0;        // bodies on all ranks: with one alone, none can come near another
+  std::size_t stay_near_ = 0;   // interface granules that stayed atoms the last time because something is near
+  bool shell_changed_ = false;  // by granules that something came near to, or that nothing is near any more
   FlatMap<char> freed_anywhere_, locked_anywhere_;
-  FlatMap<int> ghost_body_;      // tag -> key of the body of an interface ghost
-  std::vector<int> freed_keys_;  // bodies that wake as a whole, by key, in this change
+  FlatMap<int> ghost_body_;                                            // tag -> key of the body of an interface ghost
+  std::vector<int> freed_keys_;                                        // bodies that wake as a whole, by key, in this change
   std::vector<std::pair<std::int64_t, std::int64_t>> fresh_contacts_;  // frozen in this change
   std::vector<double> fresh_histories_;                                // theirs, as the first sees it, world frame
   std::vector<double> joins_;  // rows (place of a, a, b): resting against another body for long enough
@@ -405,9 +409,9 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   int observed_ = 0;                         // that body
   Pose observed_then_;                       // where it was when the observer last followed
 
-  std::vector<int> locked_index_;   // atom indices of interface granules since the last reneighbouring
-  std::vector<int> locked_slot_;    // their bodies in active_
-  std::vector<Vec3> locked_place_;  // and places there
+  std::vector<int> locked_index_;    // atom indices of interface granules since the last reneighbouring
+  std::vector<int> locked_slot_;     // their bodies in active_
+  std::vector<Vec3> locked_place_;   // and places there
   std::vector<std::size_t> riding_;  // those of them whose bodies move
   bool locked_index_stale_ = true;
   std::vector<int> motion_words_;  // of a record: what is of no worth once a step has passed
@@ -419,9 +423,9 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   bool new_run_ = false;
   int interface_group_ = -1;
   WorthWatch worth_;
-  std::int64_t judged_at_ = -1;             // step of the last judgement
-  std::int64_t builds_asked_ = 0;           // neighbour lists built because this fix asked, since then
-  std::int64_t restored_then_ = 0;          // granules restored until then
+  std::int64_t judged_at_ = -1;     // step of the last judgement
+  std::int64_t builds_asked_ = 0;   // neighbour lists built because this fix asked, since then
+  std::int64_t restored_then_ = 0;  // granules restored until then
   bool told_no_worth_ = false;
   int quick_looks_ = 0;  // left at the start of a run in which nothing is culled yet
   std::int64_t next_look_ = -1;

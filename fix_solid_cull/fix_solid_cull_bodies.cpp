@@ -259,6 +259,23 @@ int FixSolidCull::key_of_atom(int i) const {
   return key ? *key : 0;
 }
 
+/// Stored granules that may touch one of another rank.
+std::vector<std::int64_t> FixSolidCull::stored_at_borders() const {
+  std::vector<std::int64_t> tags;
+  const double reach = 2 * store_->largest_radius() + neighbor->skin + store_slack();
+  const Vec3 out = Vec3::Constant(reach + domain->prd[0] + domain->prd[1] + domain->prd[2]);
+  const Vec3 lo = vec(domain->sublo), hi = vec(domain->subhi);
+  for (int d = 0; d < 3; ++d)
+    for (const bool upper : {false, true}) {
+      Vec3 from = lo - out, to = hi + out;
+      (upper ? from : to)[d] = upper ? hi[d] - reach : lo[d] + reach;
+      for_each_stored_in_box(from, to, [&](const Resident& g) { tags.push_back(g.tag); });
+    }
+  std::sort(tags.begin(), tags.end());
+  tags.erase(std::unique(tags.begin(), tags.end()), tags.end());
+  return tags;
+}
+
 void FixSolidCull::group_bodies() {
   groups_.clear();
   spanning_.clear();
@@ -267,12 +284,20 @@ void FixSolidCull::group_bodies() {
   // a contact across ranks joins the bodies of its two ends: each rank sends its end, all ranks join the same pairs
   constexpr int columns = 6;
   std::vector<double> rows;
-  contacts_.for_each_contact([&](std::int64_t low, std::int64_t high, const double*) {
-    const int a = bodies_.body_of(low), b = bodies_.body_of(high);
-    if ((a == 0) == (b == 0)) return;
-    const Vec3 x = bodies_.pose(a ? a : b).to_world(mass_of(a ? low : high).position);
-    rows.insert(rows.end(), {double(low), double(high), double(a ? a : b) * comm->nprocs + comm->me, x[0], x[1], x[2]});
-  });
+  const auto reaches_out = [&](std::int64_t tag) {
+    const int body = bodies_.body_of(tag);
+    if (!body) return;
+    contacts_.for_each_partner(tag, [&](std::int64_t partner) {
+      if (bodies_.body_of(partner)) return;
+      const Vec3 x = bodies_.pose(body).to_world(mass_of(tag).position);
+      rows.insert(rows.end(), {double(std::min(tag, partner)), double(std::max(tag, partner)),
+                               double(body) * comm->nprocs + comm->me, x[0], x[1], x[2]});
+    });
+  };
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (shell_[i].locked) reaches_out(atom->tag[i]);
+  for (const std::int64_t tag : stored_at_borders()) reaches_out(tag);
+  arriving_.for_each([&](std::int64_t tag, const Arrival&) { reaches_out(tag); });
   rows = halo_.gather_all(rows);
   struct Link {
     int parent;
@@ -384,7 +409,8 @@ void FixSolidCull::adopt_places() {
     if (sleeping()) find_frame(body);
   }
   merges_.clear();
-  for (const auto& m : bodies_.take_merges()) merges_.push_back({m.first, m.second, bodies_.pose(m.second)});
+  for (const auto& m : bodies_.take_merges())
+    if (meshes_wanted_) merges_.push_back({m.first, m.second, bodies_.pose(m.second)});
   bodies_.forget_swallowed();
 }
 

@@ -171,8 +171,7 @@ void FixSolidCull::write_bed_file(const std::string& pattern) {
     double x[3];
     set(x, in_world(g));
     domain->remap(x);
-    row(vec(x), twist.at(in_world(g)), g.radius, static_cast<double>(g.tag), store_->get(g.tag).type,
-        GranuleState::interior,
+    row(vec(x), twist.at(in_world(g)), g.radius, static_cast<double>(g.tag), store_->get(g.tag).type, GranuleState::interior,
         comm->nprocs == 1 ? g.body : key_of(g.body));
   });
   rows = halo_.gather_root(rows);

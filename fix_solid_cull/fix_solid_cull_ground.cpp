@@ -1,5 +1,5 @@
-// Bodies that walls hold: they stand still, so that their granules at walls may go to the store too, and hand on to the walls what
-// presses on them.
+// Bodies that walls hold: they stand still, so that their granules at walls may go to the store too, and hand on to the walls
+// what presses on them.
 #include <mpi.h>
 
 #include <algorithm>
@@ -17,10 +17,12 @@
 namespace solidcull {
 namespace {
 
-// looks in a row at rest before walls are taken to hold a body
+// looks in a row at rest, and in balance to this share of its weight, before walls are taken to hold a body: what it weighs on
+// them then is what they will feel
 constexpr int looks_at_rest = 2;
-// what presses on a grounded body since it was locked, in its weight: beyond, the walls might not hold it, and it moves as a rigid
-// body with live contacts at the walls again
+constexpr double balance_share = 0.002;
+// what presses on a grounded body since it was locked, in its weight: beyond, the walls might not hold it, and it moves as a
+// rigid body with live contacts at the walls again
 constexpr double along_share = 0.1, against_share = 0.5;
 // interface granules that nothing holds any more go to the store at the next rebuild of the neighbour lists; for this share of
 // all atoms, at once
@@ -62,18 +64,24 @@ void FixSolidCull::forget_body(int body) {
 }
 
 void FixSolidCull::ground_bodies() {
-  if (!sleeping() || !rigid()) return;
+  if (!rigid()) {
+    share_out_loads();
+    return;
+  }
   // over all ranks a body that spans them is one: which of its parts touch walls
   std::set<int> spanning_held;
   if (comm->nprocs > 1) {
     std::vector<double> keys;
     for (const auto& [number, body] : bodies_.bodies())
-      if (body.mass.held > 0 && std::binary_search(spanning_.begin(), spanning_.end(), key_of(number))) keys.push_back(key_of(number));
+      if (body.mass.held > 0 && std::binary_search(spanning_.begin(), spanning_.end(), key_of(number)))
+        keys.push_back(key_of(number));
     for (const double key : halo_.gather_all(keys)) spanning_held.insert(static_cast<int>(key));
   }
   const Vec3 g = gravity();
   const Vec3 down = g.norm() > 0 ? Vec3(g.normalized()) : Vec3(Vec3::Zero());
   const double slow = SolidStateLaw::drift_share * solid_state_.speed;
+  FlatMap<Vec3> net;
+  for (const ActiveBody& a : active_) net[a.number] = a.force;
   for (auto& [number, body] : bodies_.bodies()) {
     const bool held = body.mass.held > 0 || spanning_held.count(key_of(number));
     if (body.grounded) {
@@ -87,7 +95,9 @@ void FixSolidCull::ground_bodies() {
       continue;
     }
     const double size = std::cbrt(static_cast<double>(body.mass.count)) * diameter_;
-    const bool at_rest = held && body.twist.at(body.pose.to_world(body.mass.centre())).norm() + body.twist.spin.norm() * size < slow;
+    const Vec3* force = net.find(number);
+    const bool at_rest = held && force && force->norm() < balance_share * body.motion.mass() * weight_scale_ &&
+                         body.twist.at(body.pose.to_world(body.mass.centre())).norm() + body.twist.spin.norm() * size < slow;
     if (!at_rest) {
       rested_.erase(number);
       continue;
@@ -105,8 +115,7 @@ void FixSolidCull::ground_bodies() {
   std::size_t may_go = 0;
   for (const int i : locked_index_) may_go += may_leave_its_walls(shell_[i]);
   const double gain = static_cast<double>(may_go) - static_cast<double>(stay_near_);
-  if (any_rank(!lifting_.empty() || gain > std::max(worth_of_a_build * atom->nlocal, 10.0)))
-    ask_for_build(update->ntimestep + 1);
+  if (any_rank(!lifting_.empty() || gain > std::max(worth_of_a_build * atom->nlocal, 10.0))) ask_for_build(update->ntimestep + 1);
 }
 
 void FixSolidCull::share_out_loads() {

@@ -271,8 +271,7 @@ bool FixSolidCull::find_calm() {
         e.lock_step = update->ntimestep;
       }
     } else if (solid) {
-      solid = law.at_rest(vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]) &&
-              law.balanced(acceleration[i], Vec3::Zero());
+      solid = law.at_rest(vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]) && law.balanced(acceleration[i], Vec3::Zero());
     }
     e.calm = solid ? e.calm + 1 : 0;
     candidates = candidates || e.calm >= settings_.calm;
@@ -522,22 +521,21 @@ void FixSolidCull::judge_worth(std::int64_t chosen, std::int64_t exterior) {
   const double steps = static_cast<double>(update->ntimestep - std::max(judged_at_, update->ntimestep - look_every_));
   const double saved =
       steps * (WorthWatch::interior * static_cast<double>(counts[1]) + WorthWatch::interface * static_cast<double>(counts[0]));
-  const double spent = static_cast<double>(counts[3]) * (WorthWatch::look + WorthWatch::build * static_cast<double>(builds_asked_)) +
-                       WorthWatch::wake * static_cast<double>(counts[2]);
+  const double spent =
+      static_cast<double>(counts[3]) * (WorthWatch::look + WorthWatch::build * static_cast<double>(builds_asked_)) +
+      WorthWatch::wake * static_cast<double>(counts[2]);
   judged_at_ = update->ntimestep;
   builds_asked_ = 0;
   restored_then_ = ledger_.granules_restored();
   const bool culling = chosen + counts[0] + counts[1] > 0;
   const int wait = worth_.judge(saved, spent, culling);
-  if (wait == 0) {
-    told_no_worth_ = told_no_worth_ && !culling;
-    return;
-  }
+  if (wait == 0) return;
   no_cull_until_ = std::max(no_cull_until_, update->ntimestep + static_cast<std::int64_t>(wait) * look_every_);
   if (told_no_worth_ || !worth_.waits_longest()) return;
   told_no_worth_ = true;
   say("fix " + std::string(id) + " solid/cull: among " + std::to_string(exterior) +
-      " granules too few can be culled for it to pay; trying again every " + std::to_string(wait * look_every_) + " steps or more");
+      " granules too few can be culled for it to pay; trying again every " + std::to_string(wait * look_every_) +
+      " steps or more");
 }
 
 void FixSolidCull::ask_for_build(std::int64_t step) {

@@ -77,8 +77,9 @@ MovingGranule FixSolidCull::moving(int i) const {
   const ShellEntry& e = shell_[i];
   // a granule that is locked has the motion that it had before
   const bool now = e.locked && e.lock_step == update->ntimestep;
-  return {atom->rmass[i], atom->radius[i], vec(atom->x[i]), now ? e.velocity : vec(atom->v[i]),
-          now ? e.spin : vec(atom->omega[i]), e.held};
+  return {
+      atom->rmass[i], atom->radius[i], vec(atom->x[i]), now ? e.velocity : vec(atom->v[i]), now ? e.spin : vec(atom->omega[i]),
+      e.held};
 }
 
 std::vector<FixSolidCull::Ball> FixSolidCull::collect_balls() {
@@ -172,7 +173,7 @@ void FixSolidCull::change_membership() {
   normal_loads_.clear();
   touches_.clear();
   joins_.clear();
-  if (memory_.too_large()) fit_memory();
+  if (!new_run_ && memory_.too_large()) fit_memory();  // walls keep pointers into the arrays over the setup of a run
   locked_index_stale_ = true;
   refresh_locked();
   if (rigid()) give_velocities();
@@ -220,13 +221,29 @@ void FixSolidCull::free_from_bodies() {
 
 void FixSolidCull::lock_into_bodies() {
   const auto mass = [&](std::int64_t tag) { return mass_of(tag); };
-  for (const std::int64_t tag : locked_now_) {
+  const auto lock_one = [&](std::int64_t tag) {
     const int i = *index_of_.find(tag);
     MovingGranule granule = moving(i);
     if (!rigid()) granule.velocity = granule.spin = Vec3::Zero();  // its momentum goes to the ground
     const SolidBodies::Place at = bodies_.lock(tag, granule, contacts_, mass);
     shell_[i].body = at.body;
     shell_[i].place = at.position;
+  };
+  // from neighbour to neighbour, so that what hangs together becomes one body without many that merge
+  FlatMap<char, std::int32_t> waits;
+  waits.reserve(locked_now_.size());
+  for (const std::int64_t tag : locked_now_) waits[static_cast<std::int32_t>(tag)] = 1;
+  std::vector<std::int64_t> queue;
+  for (const std::int64_t first : locked_now_) {
+    if (!waits.erase(static_cast<std::int32_t>(first))) continue;
+    queue.assign(1, first);
+    for (std::size_t at = 0; at < queue.size(); ++at) {
+      const std::int64_t tag = queue[at];
+      lock_one(tag);
+      contacts_.for_each_partner(tag, [&](std::int64_t partner) {
+        if (waits.erase(static_cast<std::int32_t>(partner))) queue.push_back(partner);
+      });
+    }
   }
   for (std::size_t r = 0; r < joins_.size(); r += 5)
     bodies_.join(static_cast<std::int64_t>(joins_[r + 3]), static_cast<std::int64_t>(joins_[r + 4]), mass);
@@ -732,7 +749,8 @@ void FixSolidCull::thaw_contacts() {
   thawed_ = !freed_anywhere_.empty();
 }
 
-/// Walls do not hinder it from going to the store: there are none, or they and its body stand still, and what they do to it is known.
+/// Walls do not hinder it from going to the store: there are none, or they and its body stand still, and what they do to it is
+/// known.
 bool FixSolidCull::may_leave_its_walls(const ShellEntry& e) const {
   if (!e.wall_near) return true;
   return sleeping() && !e.moving_wall_near && stands_still(e.body) && e.came_back != update->ntimestep && !new_run_;
@@ -746,17 +764,17 @@ void FixSolidCull::store_what_is_deep(bool change) {
 
   std::vector<Sphere> exterior;
   std::vector<Sphere> shells;
-  std::vector<int> shell_body;
-  const auto sort_in = [&](const Sphere& s, int body) {
-    if (!body) {
-      exterior.push_back(s);
+  std::vector<Foreign> of_shell;
+  const auto sort_in = [&](const Foreign& f) {
+    if (!f.body) {
+      exterior.push_back(f.sphere);
     } else if (store_bodies_ > 1) {
-      shells.push_back(s);
-      shell_body.push_back(body);
+      shells.push_back(f.sphere);
+      of_shell.push_back(f);
     }
   };
-  for (int i = 0; i < atom->nlocal; ++i) sort_in(sphere(i), shell_[i].locked ? key_of(shell_[i].body) : 0);
-  for (const Foreign& f : halo_foreign_) sort_in(f.sphere, f.body);
+  for (int i = 0; i < atom->nlocal; ++i) sort_in(as_foreign(i));
+  for (const Foreign& f : halo_foreign_) sort_in(f);
   SphereCells cells, shell_cells;
   cells.build(std::move(exterior), 2 * diameter_);
   shell_cells.build(std::move(shells), 2 * diameter_);
@@ -771,7 +789,8 @@ void FixSolidCull::store_what_is_deep(bool change) {
   if (store_bodies_ > 1) {
     std::size_t most = 0;
     for (const auto& [number, body] : bodies_.bodies())
-      if (static_cast<std::size_t>(body.mass.count) > most) most = static_cast<std::size_t>(body.mass.count), largest = key_of(number);
+      if (static_cast<std::size_t>(body.mass.count) > most)
+        most = static_cast<std::size_t>(body.mass.count), largest = key_of(number);
     store_->for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
       if (key_of(body) == largest) return;
       const Pose& pose = bodies_.pose(body);
@@ -783,17 +802,30 @@ void FixSolidCull::store_what_is_deep(bool change) {
   const bool images = halo_.image_shifts().size() > 1;
   const auto near_another_body = [&](int i) {
     if (store_bodies_ <= 1) return false;
-    const int own = key_of(shell_[i].body);
-    const Sphere s = sphere(i);
-    if (shell_cells.any_near(s, gap, [&](std::size_t other) { return shell_body[other] != own; })) return true;
+    const Foreign self = as_foreign(i);
+    const Sphere& s = self.sphere;
+    // bodies that both stand still may be as near as they like, but what they do to each other needs two atoms
+    const auto touches = [&](const Sphere& other) {
+      const double reach = (1 + SolidStateLaw::gap) * (s.radius + other.radius);
+      return (nearest_image(other.centre, s.centre) - s.centre).squaredNorm() < reach * reach;
+    };
+    if (shell_cells.any_near(s, gap, [&](std::size_t k) {
+          const Foreign& other = of_shell[k];
+          return other.body != self.body && (!(self.stands && other.stands) || touches(other.sphere));
+        }))
+      return true;
     const double reach = s.radius + gap;
-    if (own == largest && !images && std::none_of(others.begin(), others.end(), [&](const Extent& e) {
+    if (self.body == largest && !images && std::none_of(others.begin(), others.end(), [&](const Extent& e) {
           return (s.centre.array() > e.lo.array() - reach).all() && (s.centre.array() < e.hi.array() + reach).all();
         }))
       return false;
     bool near = false;
     for_each_stored_near(
-        s, gap, [&](const Resident&) { near = true; }, own);
+        s, gap,
+        [&](const Resident& g) {
+          near = near || !(self.stands && stands_still(g.body)) || touches({in_world(g), g.radius});
+        },
+        self.body);
     return near;
   };
   std::vector<int> deep;

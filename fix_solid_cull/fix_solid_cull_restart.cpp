@@ -285,8 +285,7 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
   for (const auto& [tag, t] : taken) {
     const SolidBody& from = t.block->bodies[t.granule->body];
     const Vec3 x = from.pose.to_world(t.granule->place);
-    const MovingGranule granule{t.granule->mass,      t.granule->radius, x, from.twist.at(x),
-                                from.twist.spin, t.granule->held};
+    const MovingGranule granule{t.granule->mass, t.granule->radius, x, from.twist.at(x), from.twist.spin, t.granule->held};
     const SolidBodies::Place at = bodies_.lock(tag, granule, contacts_, [&](std::int64_t other) { return mass_of(other); });
     SolidBody& to = bodies_.body(at.body);
     if (!to.felt_known && from.felt_known) {

@@ -13,9 +13,9 @@ namespace solidcull {
 
 /// The force of one wall element on one granule. SI units, world frame.
 struct WallLoad {
-  int mesh = 0, element = 0;     ///< the adapter's numbers
-  Vec3 force = Vec3::Zero();     ///< on the granule (N)
-  Vec3 torque = Vec3::Zero();    ///< of that force about the mesh's point of reference (N m)
+  int mesh = 0, element = 0;   ///< the adapter's numbers
+  Vec3 force = Vec3::Zero();   ///< on the granule (N)
+  Vec3 torque = Vec3::Zero();  ///< of that force about the mesh's point of reference (N m)
 };
 
 /// Sums per body and element, kept as granules come and go. Local to the rank.

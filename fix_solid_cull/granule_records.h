@@ -18,7 +18,8 @@ class GranuleRecords : protected LAMMPS_NS::Pointers {
 
   /// Packs owned granule i; `layout` receives the number of its column layout.
   void pack(int i, std::vector<double>& record, int& layout);
-  /// Which numbers of a record are position, velocity and spin (position only where `positions`), by trying them on owned granule i.
+  /// Which numbers of a record are position, velocity and spin (position only where `positions`), by trying them on owned granule
+  /// i.
   std::vector<int> motion_words(int i, bool positions);
   /// Deletes owned granule i; the last owned granule takes its index.
   void remove(int i);

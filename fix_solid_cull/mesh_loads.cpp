@@ -61,11 +61,10 @@ void MeshLoads::contact(FixMeshSurface* fix, int granule, const double* force, c
 }
 
 std::vector<WallLoad> MeshLoads::of(std::int64_t tag) {
-  if (!sorted_)
-    std::stable_sort(seen_.begin(), seen_.end(), [](const Seen& a, const Seen& b) { return a.tag < b.tag; });
+  if (!sorted_) std::stable_sort(seen_.begin(), seen_.end(), [](const Seen& a, const Seen& b) { return a.tag < b.tag; });
   sorted_ = true;
   std::vector<WallLoad> loads;
-  for (auto s = std::lower_bound(seen_.begin(), seen_.end(), tag, [](const Seen& a, std::int64_t t) { return a.tag < t; });
+  for (auto s = std::lower_bound(seen_.begin(), seen_.end(), tag, [](const Seen&a, std::int64_t t) { return a.tag < t; });
        s != seen_.end() && s->tag == tag; ++s)
     loads.push_back(s->load);
   return loads;

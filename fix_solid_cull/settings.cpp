@@ -65,8 +65,7 @@ using Reader = std::function<void(Values&, Settings&)>;
 const std::map<std::string, Reader>& readers() {
   static const std::map<std::string, Reader> table = {
       {"every", [](Values& v, Settings& s) { s.every = v.whole("a whole number of steps, 1 or more", 1); }},
-      {"depth", [](Values& v,
-                   Settings& s) { s.depth = v.number("a number of mean diameters, 0 to 50", 0, true, 50); }},
+      {"depth", [](Values& v, Settings& s) { s.depth = v.number("a number of mean diameters, 0 to 50", 0, true, 50); }},
       {"exterior",
        [](Values& v, Settings& s) {
          v.one_of("'live' or 'sleep'",
@@ -145,8 +144,9 @@ Settings parse_settings(const std::vector<std::string>& words) {
   }
   if (s.depth < 0) s.depth = s.exterior == Exterior::live ? 2.0 : 0.0;
   if (s.exterior == Exterior::live && s.depth == 0)
-    throw InputError("keyword 'depth' has the value '0' and 'exterior' the value 'live': give a cover of more than 0, or say "
-                     "'exterior sleep'");
+    throw InputError(
+        "keyword 'depth' has the value '0' and 'exterior' the value 'live': give a cover of more than 0, or say "
+        "'exterior sleep'");
   if (s.exterior == Exterior::live && 2 * s.voxel > s.depth) {
     const auto text = [](double x) {
       std::string t = std::to_string(x);

@@ -27,10 +27,10 @@ struct ShellEntry {
                                                       ///< granule: its velocity when calm began
 
   // all granules
-  int walls = 0;            ///< walls and triangles touched at the last look
-  bool wall_moves = false;  ///< one of them can move
-  bool stands = false;      ///< one of them stands still
-  bool wall_near = true;    ///< within the skin of a wall; true until a look has seen that it is not
+  int walls = 0;                 ///< walls and triangles touched at the last look
+  bool wall_moves = false;       ///< one of them can move
+  bool stands = false;           ///< one of them stands still
+  bool wall_near = true;         ///< within the skin of a wall; true until a look has seen that it is not
   bool moving_wall_near = true;  ///< of one that can move; likewise
   std::int64_t came_back = -1;   ///< step in which it came out of the store
 
@@ -51,13 +51,14 @@ struct ShellEntry {
   }
   static constexpr int packed_size = 29;
   void pack(double* to) const {
-    const double values[packed_size] = {double(locked),   double(fresh),   reference[0],       reference[1],
-                                        reference[2],     load_change[0],  load_change[1],     load_change[2],
-                                        normal_load,      excess,          double(wall_moves), double(lock_step),
-                                        velocity[0],      velocity[1],     velocity[2],        spin[0],
-                                        spin[1],          spin[2],         double(walls),      double(wall_near),
-                                        double(calm),     double(waited),  double(registered), registered_at[0],
-                                        registered_at[1], registered_at[2], double(held), double(moving_wall_near), double(stands)};
+    const double values[packed_size] = {double(locked),   double(fresh),    reference[0],       reference[1],
+                                        reference[2],     load_change[0],   load_change[1],     load_change[2],
+                                        normal_load,      excess,           double(wall_moves), double(lock_step),
+                                        velocity[0],      velocity[1],      velocity[2],        spin[0],
+                                        spin[1],          spin[2],          double(walls),      double(wall_near),
+                                        double(calm),     double(waited),   double(registered), registered_at[0],
+                                        registered_at[1], registered_at[2], double(held),       double(moving_wall_near),
+                                        double(stands)};
     for (int k = 0; k < packed_size; ++k) to[k] = values[k];
   }
   static ShellEntry unpack(const double* v) {

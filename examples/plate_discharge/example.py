@@ -2,12 +2,15 @@
 
     examples/plate_discharge/example.py [--unculled N] [--culled N] [--fix KEYWORDS] [--steps N] [--few-steps]
 
-A run that is in out/ already, of the same decks and variables, is not made again: the unculled one takes an hour.
+A run that is in out/ already, of the same decks and variables, and, if culled, of the same library, is not made again: the
+unculled one takes an hour.
 """
 import argparse
+import hashlib
 import json
 import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -108,12 +111,20 @@ def heap(run):
 
 # --- runs -----------------------------------------------------------------------------------------------------------
 
-def run_once(deck, name, variables, text, leaves):
-    """Runs a deck, unless its log is there and was made of the same text and variables; the log's text, and whether it ran.
-    `leaves`: the file that it writes last."""
+def hash_of_fix():
+    """Of the launcher and the library that holds the fix."""
+    launcher = twin.find_launcher(LAUNCHER)
+    needs = subprocess.run(["ldd", launcher], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout
+    files = [launcher, *re.findall(r"libsolidcull\S* => (/\S+)", needs)]
+    return hashlib.sha1(b"".join(Path(f).read_bytes() for f in files)).hexdigest()
+
+
+def run_once(deck, name, variables, text, leaves, made_with=()):
+    """Runs a deck, unless its log is there and was made of the same text and variables, and with the same; the log's text, and
+    whether it ran. With --few-steps it always runs. `leaves`: the file that it writes last."""
     log, note = OUT / f"{name}.log", OUT / f"{name}.recipe"
-    recipe = json.dumps([variables, text, (HERE / "material.in").read_text(), (HERE / "plate.stl").read_text()])
-    if log.exists() and leaves.exists() and note.exists() and note.read_text() == recipe:
+    recipe = json.dumps([variables, text, (HERE / "material.in").read_text(), (HERE / "plate.stl").read_text(), *made_with])
+    if FEW not in name and log.exists() and leaves.exists() and note.exists() and note.read_text() == recipe:
         return log.read_text(errors="replace"), False
     for old in (note, leaves, *OUT.glob(f"{name}.bed.*.vtp")):
         old.unlink(missing_ok=True)
@@ -127,7 +138,7 @@ def run_once(deck, name, variables, text, leaves):
 def fill(few):
     """The restart file of the filled plate, at t = 0.75 s; and the time that its run took (s)."""
     name = f"filled{FEW if few else ''}"
-    variables = {"restart": f"out/{name}.restart", **({"granules": 500, "steps": 2000} if few else {})}
+    variables = {"restart": f"out/{name}.restart", **({"granules": 500, "steps": 5000} if few else {})}
     printed, _ = run_once(HERE / "fill.in", name, variables, (HERE / "fill.in").read_text(), HERE / variables["restart"])
     return variables["restart"], sum(t.loop_time or 0 for t in twin.parse_log(printed))
 
@@ -144,7 +155,8 @@ def discharge_run(kind, k, length, variables, keywords):
         text = re.sub(r"^(fix\s+\S+\s+\S+\s+solid/cull.*)$", rf"\1 bed {FILES} out/{name}.bed.*.vtp", text, flags=re.M)
         variables = {**variables, **({"keywords": keywords} if keywords else {})}
     made.write_text(text)
-    printed, new = run_once(made, name, {**variables, "twin": name}, text, base.with_suffix(".final"))
+    printed, new = run_once(made, name, {**variables, "twin": name}, text, base.with_suffix(".final"),
+                            (hash_of_fix(),) if culled else ())
     tables = twin.parse_log(printed)
     run = twin.Run(name, tables, sum(t.loop_time or 0 for t in tables if t.counted))
     if culled:

@@ -94,20 +94,21 @@ const char* cover = "depth 1.5";
 
 INSTANTIATE_TEST_SUITE_P(
     Models, NoOp,
-    testing::Values(Case{bed("hertz_history_epsd2", "model hertz tangential history rolling_friction epsd2"), cover},
-                    Case{bed("hertz_history_mesh", "model hertz tangential history", true), cover},
-                    Case{bed("hertz_plain", "model hertz tangential no_history"), cover},
-                    Case{bed("hertz_cdt", "model hertz tangential history rolling_friction cdt"), cover},
-                    Case{bed("hooke_history", "model hooke tangential history"), cover},
-                    Case{bed("hooke_history_epsd_mesh", "model hooke tangential history rolling_friction epsd", true), cover},
-                    Case{bed("hooke_plain_mesh", "model hooke tangential no_history", true), cover},
-                    Case{bed("hertz_sjkr", "model hertz tangential history cohesion sjkr", false, true), cover},
-                    Case{bed("hertz_sjkr_mesh", "model hertz tangential history cohesion sjkr rolling_friction epsd2", true, true), cover},
-                    Case{periodic(), cover},
-                    Case{bed("hertz_history_epsd2_sleep", "model hertz tangential history rolling_friction epsd2"), "exterior sleep"},
-                    Case{bed("hertz_history_mesh_sleep", "model hertz tangential history", true), "exterior sleep"},
-                    Case{bed("hooke_history_epsd_mesh_sleep", "model hooke tangential history rolling_friction epsd", true),
-                         "exterior sleep"}),
+    testing::Values(
+        Case{bed("hertz_history_epsd2", "model hertz tangential history rolling_friction epsd2"), cover},
+        Case{bed("hertz_history_mesh", "model hertz tangential history", true), cover},
+        Case{bed("hertz_plain", "model hertz tangential no_history"), cover},
+        Case{bed("hertz_cdt", "model hertz tangential history rolling_friction cdt"), cover},
+        Case{bed("hooke_history", "model hooke tangential history"), cover},
+        Case{bed("hooke_history_epsd_mesh", "model hooke tangential history rolling_friction epsd", true), cover},
+        Case{bed("hooke_plain_mesh", "model hooke tangential no_history", true), cover},
+        Case{bed("hertz_sjkr", "model hertz tangential history cohesion sjkr", false, true), cover},
+        Case{bed("hertz_sjkr_mesh", "model hertz tangential history cohesion sjkr rolling_friction epsd2", true, true), cover},
+        Case{periodic(), cover},
+        Case{bed("hertz_history_epsd2_sleep", "model hertz tangential history rolling_friction epsd2"), "exterior sleep"},
+        Case{bed("hertz_history_mesh_sleep", "model hertz tangential history", true), "exterior sleep"},
+        Case{bed("hooke_history_epsd_mesh_sleep", "model hooke tangential history rolling_friction epsd", true),
+             "exterior sleep"}),
     [](const testing::TestParamInfo<Case>& info) { return info.param.bed.name; });
 
 }  // namespace

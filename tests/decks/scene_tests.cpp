@@ -51,7 +51,8 @@ TEST(Scenes, ABedThatSleepsStillWeighsOnItsWalls) {
   Engine e;
   const Bed bed = mesh_bed("asleep");
   e.run(read_bed(bed) + "run 50\n");
-  const double load[] = {e.vector("floor", 3), e.vector("side", 1), e.vector("side", 3), e.vector("floor", 4), e.vector("floor", 5)};
+  const double load[] = {e.vector("floor", 3), e.vector("side", 1), e.vector("side", 3), e.vector("floor", 4),
+                         e.vector("floor", 5)};
   const double lever = std::abs(load[0]) * bed.side;
   e.run("fix cull all solid/cull exterior sleep every 50\nrun 1500\n");
   EXPECT_EQ(f(e, 1) + f(e, 2) + f(e, 3), 1300);

@@ -121,10 +121,29 @@ TEST(Settings, keywords_come_in_any_order_and_the_last_word_counts) {
 }
 
 TEST(Settings, the_limits_themselves_are_allowed) {
-  for (const char* line : {"every 1", "every 2000000000", "depth 50", "calm 1", "tolerance 0 0.1", "tolerance 0.1 0", "carve 1 1",
-                           "voxel 0.1", "exterior sleep", "exterior sleep depth 0", "depth 0 exterior sleep", "exterior sleep depth 1 voxel 2",
-                           "depth 4 voxel 2", "depth 1 voxel 0.5", "speed 1e-9", "walls closed", "walls surface",
-                           "motion rigid", "motion fixed", "mesh 1 a.vdb", "mesh 1 a.stl", "mesh 1 a.vtp", "bed 1 a.vtp"})
+  for (const char* line : {"every 1",
+                           "every 2000000000",
+                           "depth 50",
+                           "calm 1",
+                           "tolerance 0 0.1",
+                           "tolerance 0.1 0",
+                           "carve 1 1",
+                           "voxel 0.1",
+                           "exterior sleep",
+                           "exterior sleep depth 0",
+                           "depth 0 exterior sleep",
+                           "exterior sleep depth 1 voxel 2",
+                           "depth 4 voxel 2",
+                           "depth 1 voxel 0.5",
+                           "speed 1e-9",
+                           "walls closed",
+                           "walls surface",
+                           "motion rigid",
+                           "motion fixed",
+                           "mesh 1 a.vdb",
+                           "mesh 1 a.stl",
+                           "mesh 1 a.vtp",
+                           "bed 1 a.vtp"})
     EXPECT_EQ(refusal(line), "") << line;
 }
 

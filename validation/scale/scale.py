@@ -7,7 +7,7 @@ Makes the beds that are missing (out/bed-SIZE.restart), then runs each size uncu
 (impact.in) and by hand (control.in), in turns, each on one core, and prints run times, parts, memory and errors. Every run is
 kept in out/runs/; a run that is there, made of the same decks, bed and (culled) launcher, is not repeated, so that an
 interrupted series goes on where it stopped. All figures: out/scale.json, table out/scale.txt, plot out/scale.png.
-`--idle`: no ball, nothing moves. `--few-steps`: tiny beds, a few steps, no bars. `--table`: runs nothing, prints what is there.
+`--idle`: no ball, nothing moves. `--few-steps`: tiny beds, a few steps, always run anew. `--table`: runs nothing, prints what is there.
 Exit: 0 all runs there and no granule lost, 1 else, 2 a run failed.
 """
 import argparse
@@ -209,6 +209,14 @@ def sha1(file):
     return hashlib.sha1(Path(file).read_bytes()).hexdigest()
 
 
+def hash_of_launcher():
+    """Of the launcher and the library that holds the fix."""
+    launcher = twin.find_launcher(LAUNCHER)
+    needs = subprocess.run(["ldd", launcher], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout
+    library = re.search(r"libsolidcull\S* => (/\S+)", needs)
+    return sha1(launcher) + (sha1(library[1]) if library else "")
+
+
 def window(granules, sides):
     """The granules of the square of example.BOX around the middle, moved to where the bed of examples/impact is."""
     near = np.ones(len(granules), dtype=bool)
@@ -293,9 +301,9 @@ def one_run(scene, size, kind, k, settings):
     lines = deck_of(scene, kind)
     words = "\n".join(" ".join(w) for w in map(twin.words_of, lines) if w)
     recipe = hashlib.sha1(json.dumps([words, text_of("scene.in", "ball.in", "material.in", "bed.in"), variables, made_bed["hash"],
-                                      sha1(twin.find_launcher(LAUNCHER)) if kind == "culled" else ""]).encode()).hexdigest()
+                                      hash_of_launcher() if kind == "culled" else ""]).encode()).hexdigest()
     old = json.loads(kept.read_text()) if kept.exists() else None
-    if old and (old["recipe"] == recipe or settings.table):
+    if old and (settings.table or (old["recipe"] == recipe and not few_steps)):
         return {**old, "stale": old["recipe"] != recipe}
     if settings.table:
         return None

@@ -1,0 +1,132 @@
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "worth.h"
+
+namespace solidcull {
+namespace {
+
+// granule steps, of one look
+struct Look {
+  double saved, spent;
+  bool culling;
+};
+constexpr Look pays{1000, 10, true};
+constexpr Look loses{10, 1000, true};  // granules are culled and woken in turns
+constexpr Look idles{0, 10, false};    // nothing is calm: only the look itself is spent
+
+int judged(WorthWatch& worth, const Look& look) { return worth.judge(look.saved, look.spent, look.culling); }
+
+/// Looks until it waits, that one included, at most `most`; 0 if it never does. `wait`: for how long.
+int looks_until_wait(WorthWatch& worth, const Look& look, int most, int* wait = nullptr) {
+  for (int n = 1; n <= most; ++n) {
+    const int looks = judged(worth, look);
+    if (wait) *wait = looks;
+    if (looks > 0) return n;
+  }
+  return 0;
+}
+
+/// The next `count` waits where each look is this one.
+std::vector<int> waits(WorthWatch& worth, const Look& look, int count) {
+  std::vector<int> all(count, 0);
+  for (int& wait : all) looks_until_wait(worth, look, 1000, &wait);
+  return all;
+}
+
+TEST(WorthWatch, goes_on_for_ever_where_it_pays) {
+  WorthWatch worth;
+  EXPECT_EQ(looks_until_wait(worth, pays, 10000), 0);
+  EXPECT_FALSE(worth.waits_longest());
+}
+
+TEST(WorthWatch, goes_on_where_it_costs_what_it_saves) {
+  WorthWatch worth;
+  EXPECT_EQ(looks_until_wait(worth, {500, 500, true}, 1000), 0);
+  EXPECT_GT(looks_until_wait(worth, {500, 501, true}, 1000), 0);
+}
+
+TEST(WorthWatch, gives_it_a_trial_before_it_waits) {
+  WorthWatch worth, idle;
+  const int culled = looks_until_wait(worth, loses, 1000), nothing = looks_until_wait(idle, idles, 1000);
+  EXPECT_EQ(culled, 6);
+  EXPECT_EQ(nothing, 4) << "to see that nothing can be culled takes less";
+}
+
+TEST(WorthWatch, waits_twice_as_long_each_time_up_to_the_longest) {
+  WorthWatch worth;
+  EXPECT_EQ(waits(worth, loses, 9), (std::vector<int>{4, 8, 16, 32, 64, 128, 256, 256, 256}));
+}
+
+TEST(WorthWatch, waits_less_long_where_nothing_can_be_culled) {
+  WorthWatch worth;
+  EXPECT_EQ(waits(worth, idles, 5), (std::vector<int>{4, 8, 16, 16, 16}));
+}
+
+TEST(WorthWatch, does_not_keep_the_long_wait_once_nothing_is_culled_any_more) {
+  WorthWatch worth;
+  EXPECT_EQ(waits(worth, loses, 7).back(), 256);
+  EXPECT_EQ(waits(worth, idles, 2), (std::vector<int>{16, 16}));
+}
+
+TEST(WorthWatch, one_look_at_which_something_was_culled_makes_the_whole_trial_one_of_culling) {
+  WorthWatch worth;
+  judged(worth, loses);
+  EXPECT_EQ(looks_until_wait(worth, idles, 1000), 5);
+}
+
+TEST(WorthWatch, says_when_it_waits_as_long_as_where_nothing_is_culled) {
+  for (const Look& look : {idles, loses}) {
+    WorthWatch worth;
+    EXPECT_FALSE(worth.waits_longest());
+    EXPECT_EQ(waits(worth, look, 2).back(), 8);
+    EXPECT_FALSE(worth.waits_longest());
+    EXPECT_EQ(waits(worth, look, 1).back(), 16);
+    EXPECT_TRUE(worth.waits_longest());
+    waits(worth, look, 2);
+    EXPECT_TRUE(worth.waits_longest());
+  }
+}
+
+TEST(WorthWatch, begins_anew_after_a_wait) {
+  WorthWatch worth;
+  const Look dear{0, 1e9, true};
+  ASSERT_EQ(waits(worth, dear, 1).back(), 4);
+  EXPECT_EQ(looks_until_wait(worth, pays, 10000), 0) << "what was spent before the wait is forgotten";
+}
+
+TEST(WorthWatch, comes_back_to_short_waits_only_after_it_has_paid_for_long) {
+  for (const bool long_enough : {false, true}) {
+    WorthWatch worth;
+    ASSERT_EQ(waits(worth, loses, 2).back(), 8);
+    const int good = long_enough ? 4 * 8 + 1 : 4 * 8;
+    ASSERT_EQ(looks_until_wait(worth, pays, good), 0);
+    int wait = 0;
+    ASSERT_GT(looks_until_wait(worth, {0, 1e6, true}, 1000, &wait), 0);
+    EXPECT_EQ(wait, long_enough ? 4 : 16);
+  }
+}
+
+TEST(WorthWatch, a_wake_up_now_and_then_does_not_stop_what_pays_on_the_whole) {
+  WorthWatch worth;
+  for (int n = 0; n < 1000; ++n)
+    ASSERT_EQ(judged(worth, n % 10 == 9 ? Look{0, 4000, true} : Look{1000, 10, true}), 0) << "look " << n;
+}
+
+TEST(WorthWatch, stops_soon_where_it_paid_for_long_and_pays_no_more) {
+  WorthWatch worth;
+  ASSERT_EQ(looks_until_wait(worth, pays, 10000), 0);
+  const int looks = looks_until_wait(worth, loses, 1000);
+  EXPECT_GE(looks, 2);
+  EXPECT_LE(looks, 20) << "of what was saved long ago little counts";
+}
+
+TEST(WorthWatch, a_granule_that_is_out_of_the_engine_saves_more_than_one_of_the_shell) {
+  EXPECT_GT(WorthWatch::interior, WorthWatch::interface);
+  EXPECT_GT(WorthWatch::interface, 0);
+  EXPECT_GT(WorthWatch::wake, WorthWatch::build);
+}
+
+}  // namespace
+}  // namespace solidcull
