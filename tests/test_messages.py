@@ -217,7 +217,8 @@ class MissedPhysics(Case):
 
 class KeywordRefusals(Case):
     STEPS = "a whole number of steps, 1 or more"
-    DEPTH = "a number of mean diameters, more than 0 and at most 50"
+    DEPTH = "a number of mean diameters, 0 to 50"
+    EXTERIOR = "'live' or 'sleep'"
     SPEED = "a fraction of sqrt(g d), more than 0"
     LOOKS = "a whole number of looks, 1 or more"
     TOLERANCE = "two numbers A R, 0 or more and not both 0"
@@ -229,9 +230,9 @@ class KeywordRefusals(Case):
     # words after `solid/cull`: keyword that is named, its value (None: missing), what to give
     WRONG = {
         "every 1.5": ("every", "1.5", STEPS), "every 0": ("every", "0", STEPS), "every": ("every", None, STEPS),
-        "depth deep": ("depth", "deep", DEPTH), "depth 0": ("depth", "0", DEPTH), "depth 51": ("depth", "51", DEPTH),
+        "depth deep": ("depth", "deep", DEPTH), "depth -1": ("depth", "-1", DEPTH), "depth 51": ("depth", "51", DEPTH),
         "depth": ("depth", None, DEPTH),
-        "exterior sleep": ("exterior", "sleep", "'live'"), "exterior": ("exterior", None, "'live'"),
+        "exterior awake": ("exterior", "awake", EXTERIOR), "exterior": ("exterior", None, EXTERIOR),
         "speed fast": ("speed", "fast", SPEED), "speed -1": ("speed", "-1", SPEED), "speed": ("speed", None, SPEED),
         "calm 2.5": ("calm", "2.5", LOOKS), "calm 0": ("calm", "0", LOOKS), "calm": ("calm", None, LOOKS),
         "tolerance x 0": ("tolerance", "x", TOLERANCE), "tolerance 3 -1": ("tolerance", "-1", TOLERANCE),
@@ -252,6 +253,13 @@ class KeywordRefusals(Case):
             with self.subTest(words):
                 what = "ends too early" if value is None else f"has the value '{value}'"
                 self.refused_by_fix(deck(f"{FIX} {words}", granules=False), f"keyword '{keyword}' {what}: give {wanted}")
+
+    def test_no_cover_below_a_live_surface(self):
+        for words in ("depth 0", "exterior live depth 0", "depth 0 exterior live"):
+            with self.subTest(words):
+                self.refused_by_fix(deck(f"{FIX} {words}", granules=False),
+                                    "keyword 'depth' has the value '0' and 'exterior' the value 'live': give a cover of more than 0, "
+                                    "or say 'exterior sleep'")
 
     def test_each_keyword_is_tested(self):
         self.assertEqual(", ".join(sorted({k for k, _, _ in self.WRONG.values()})), self.KEYWORDS)
