@@ -2,7 +2,11 @@
 // the compiler against the engine's own headers, so a LIGGGHTS that names these members otherwise does not compile.
 #include "engine_access.h"
 
+#include <dlfcn.h>
+
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 
 #include "fix.h"
 #include "fix_contact_history.h"
@@ -83,6 +87,12 @@ void shrink_lists(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Memory& memory, int 
   places = nullptr;
   radii = nullptr;
   neighbor.*member(HeldAtoms()) = 0;
+}
+
+void* next_symbol(const char* mangled) {
+  if (void* const found = dlsym(RTLD_NEXT, mangled)) return found;
+  std::fprintf(stderr, "ERROR: solidcull: this LIGGGHTS has no '%s': use LIGGGHTS-PUBLIC 3.8.0 as Debian builds it\n", mangled);
+  std::abort();
 }
 
 }  // namespace solidcull::engine

@@ -20,6 +20,14 @@ namespace solidcull::engine {
 
 using FixCreator = LAMMPS_NS::Fix* (*)(LAMMPS_NS::LAMMPS*, int, char**);
 
+/// The engine's own function behind one that this library interposes, by its mangled name; ends the program with one line where
+/// there is none.
+void* next_symbol(const char* mangled);
+template <class Function>
+Function own(const char* mangled) {
+  return reinterpret_cast<Function>(next_symbol(mangled));
+}
+
 /// The engine's table of fix styles.
 std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify);
 

@@ -1,8 +1,6 @@
 // Makes the two styles known to an unmodified LIGGGHTS. Fix styles stand in a table; region styles in an if-chain, so the
 // engine's own Domain::add_region is interposed: this library comes before libliggghts.so in the search for symbols, and asks for
 // the next. So is the call by which a wall tells its mesh of a contact: loads of granules that are put away must be known.
-#include <dlfcn.h>
-
 #include <cstring>
 #include <string>
 
@@ -36,25 +34,20 @@ void add_interface_mesh(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg) {
   domain->nregion++;
 }
 
-template <class Function>
-Function next_symbol(const char* mangled) {
-  return reinterpret_cast<Function>(dlsym(RTLD_NEXT, mangled));
-}
-
 }  // namespace
 
 namespace LAMMPS_NS {
 
 void Modify::add_fix(int narg, char** arg, char* suffix) {
   using Original = void (*)(Modify*, int, char**, char*);
-  static const auto original = next_symbol<Original>("_ZN9LAMMPS_NS6Modify7add_fixEiPPcS1_");
+  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Modify7add_fixEiPPcS1_");
   solidcull::engine::fix_styles(*this)["solid/cull"] = make_fix;
   original(this, narg, arg, suffix);
 }
 
 void Domain::add_region(int narg, char** arg) {
   using Original = void (*)(Domain*, int, char**);
-  static const auto original = next_symbol<Original>("_ZN9LAMMPS_NS6Domain10add_regionEiPPc");
+  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Domain10add_regionEiPPc");
   if (narg >= 2 && std::strcmp(arg[1], "interface/mesh") == 0)
     add_interface_mesh(lmp, narg, arg);
   else
@@ -63,7 +56,7 @@ void Domain::add_region(int narg, char** arg) {
 
 void FixMeshSurface::add_particle_contribution(int ip, double* frc, double* delta, int iTri, double* v_wall) {
   using Original = void (*)(FixMeshSurface*, int, double*, double*, int, double*);
-  static const auto original = next_symbol<Original>("_ZN9LAMMPS_NS14FixMeshSurface25add_particle_contributionEiPdS1_iS1_");
+  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS14FixMeshSurface25add_particle_contributionEiPdS1_iS1_");
   solidcull::MeshLoads::contact(this, ip, frc, delta, iTri);
   original(this, ip, frc, delta, iTri, v_wall);
 }
