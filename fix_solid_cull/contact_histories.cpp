@@ -1,6 +1,5 @@
 #include "contact_histories.h"
 
-#include <algorithm>
 #include <cstring>
 #include <string>
 
@@ -55,26 +54,31 @@ int ContactHistories::partners(int granule) const { return fix_ ? fix_->n_partne
 int ContactHistories::partner(int granule, int k) const { return fix_->partner(granule, k); }
 const double* ContactHistories::history(int granule, int k) const { return fix_->contacthistory(granule, k); }
 
-void ContactHistories::give(int granule, const std::vector<Contact>& contacts) {
+void ContactHistories::clear(int granule) {
   if (!fix_) return;
-  const std::size_t width = static_cast<std::size_t>(fix_->get_dnum());
-  std::vector<Contact> all;
-  for_each_partner(granule, [&](int p, const double* h) { all.push_back({p, std::vector<double>(h, h + width)}); });
-  for (const Contact& c : contacts)
-    if (std::none_of(all.begin(), all.end(), [&](const Contact& has) { return has.partner == c.partner; })) all.push_back(c);
-  write(granule, all);
+  double none = LAMMPS_NS::Fix::ubuf(0).d;
+  fix_->unpack_exchange(granule, &none);
 }
 
-void ContactHistories::write(int granule, const std::vector<Contact>& contacts) {
+void ContactHistories::give(int granule, const Contact* contacts, std::size_t n) {
   if (!fix_) return;
-  std::vector<double> buffer;
+  const int width = fix_->get_dnum(), before = partners(granule);
   const auto integer = [](std::int64_t i) { return LAMMPS_NS::Fix::ubuf(i).d; };
-  buffer.push_back(integer(static_cast<std::int64_t>(contacts.size())));
-  for (const Contact& c : contacts) {
-    buffer.push_back(integer(c.partner));
-    buffer.insert(buffer.end(), c.history.begin(), c.history.end());
+  std::int64_t count = 0;
+  buffer_.assign(1, 0);
+  const auto add = [&](std::int64_t partner, const double* history) {
+    ++count;
+    buffer_.push_back(integer(partner));
+    buffer_.insert(buffer_.end(), history, history + width);
+  };
+  for (int k = 0; k < before; ++k) add(partner(granule, k), history(granule, k));
+  for (const Contact* c = contacts; c != contacts + n; ++c) {
+    int k = 0;
+    while (k < before && partner(granule, k) != c->partner) ++k;
+    if (k == before) add(c->partner, c->history);
   }
-  fix_->unpack_exchange(granule, buffer.data());
+  buffer_.front() = integer(count);
+  fix_->unpack_exchange(granule, buffer_.data());
 }
 
 }  // namespace solidcull

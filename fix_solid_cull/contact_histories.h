@@ -1,8 +1,8 @@
 // The engine's granule-granule contact histories, as partner lists of the owned granules.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <map>
 #include <vector>
 
 #include "pointers.h"
@@ -33,22 +33,22 @@ class ContactHistories : protected LAMMPS_NS::Pointers {
     const int n = partners(granule);
     for (int k = 0; k < n; ++k) visit(partner(granule, k), history(granule, k));
   }
-  void clear(int granule) { write(granule, {}); }
+  void clear(int granule);
 
   struct Contact {
     std::int64_t partner;
-    std::vector<double> history;
+    const double* history;
   };
-  /// Adds contacts to an owned granule's list; a partner that is there already keeps what it has.
-  void give(int granule, const std::vector<Contact>& contacts);
+  /// Adds n contacts to an owned granule's list; a partner that is there already keeps what it has.
+  void give(int granule, const Contact* contacts, std::size_t n);
 
  private:
   int partners(int granule) const;
   int partner(int granule, int k) const;
   const double* history(int granule, int k) const;
-  void write(int granule, const std::vector<Contact>& contacts);
 
   LAMMPS_NS::FixContactHistory* fix_ = nullptr;
+  std::vector<double> buffer_;  // as the engine packs a granule's list
 };
 
 }  // namespace solidcull

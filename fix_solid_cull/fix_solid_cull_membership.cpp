@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <set>
+#include <tuple>
 
 #include "atom.h"
 #include "comm.h"
@@ -464,21 +465,31 @@ void FixSolidCull::keep_shell_closed() {
   bool some_move = false;  // of the bodies that have stored granules
   store_->for_each_frame([&](int frame, const Vec3&, const Vec3&) { some_move = some_move || !frame_stands(frame); });
   std::vector<Foreign> visitors;
+  std::vector<Sphere> places;
   const auto comes = [&](const Foreign& v) {
-    if (!v.stands || some_move) visitors.push_back(v);
+    if (v.stands && !some_move) return;
+    visitors.push_back(v);
+    places.push_back(v.sphere);
   };
   for (const Foreign& v : halo_foreign_) comes(v);
   for (int i = 0; i < atom->nlocal; ++i)
     if (!shell_[i].locked || store_bodies_ > 1) comes(as_foreign(i));
-  store_->for_each_frame([&](int frame, const Vec3&, const Vec3&) {
+  SphereCells cells;
+  cells.build(std::move(places), 2 * diameter_ + gap);
+  store_->for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
     const Pose& pose = pose_of_frame(frame);
     const int own = frame == GranuleStore::shared_frame ? -1 : key_of(frame);
     const bool stands = frame_stands(frame);
-    for (const Foreign& v : visitors)
-      if (v.body != own && !(stands && v.stands))
-        for (const Vec3& shift : halo_.image_shifts())
-          store_->for_each_near(frame, {pose.to_frame(v.sphere.centre + shift), v.sphere.radius}, gap,
+    const Vec3 middle = pose.to_world(0.5 * (lo + hi));
+    const Vec3 half = turned_half_box(pose.turn(), 0.5 * (hi - lo)) +
+                      Vec3::Constant(store_->largest_radius() + cells.largest_radius() + gap);
+    for (const Vec3& shift : halo_.image_shifts())
+      cells.for_each_in_box(middle - half - shift, middle + half - shift, [&](std::size_t v, const Sphere& s) {
+        if (visitors[v].body != own && !(stands && visitors[v].stands))
+          store_->for_each_near(frame, {pose.to_frame(s.centre + shift), s.radius}, gap,
                                 [&](const Resident& g) { near.insert(g.tag); });
+        return true;
+      });
   });
   fetch_near_walls(near);
   if (open_for_insertion_)
@@ -733,19 +744,45 @@ void FixSolidCull::freeze_histories() {
 }
 
 void FixSolidCull::thaw_contacts() {
-  std::map<int, std::vector<ContactHistories::Contact>> given;
-  freed_anywhere_.for_each([&](std::int64_t tag, char) {
+  std::vector<std::int64_t> freed;  // in the order of their tags: neighbours lie near each other in memory then
+  freed.reserve(freed_anywhere_.size());
+  freed_anywhere_.for_each([&](std::int64_t tag, char) { freed.push_back(tag); });
+  std::sort(freed.begin(), freed.end());
+  struct Given {
+    int atom;
+    std::int64_t partner;
+    std::size_t history;
+  };
+  std::vector<Given> given;
+  std::vector<double> histories;
+  const std::size_t width = contacts_.width();
+  const auto give = [&](const int* atom, std::int64_t partner, const double* history) {
+    if (!atom) return static_cast<double*>(nullptr);
+    given.push_back({*atom, partner, histories.size()});
+    histories.insert(histories.end(), history, history + width);
+    return &histories[given.back().history];
+  };
+  for (const std::int64_t tag : freed) {
     const int* mine = index_of_.find(tag);
+    const int own = bodies_.body_of(tag);
     contacts_.for_each(tag, [&](std::int64_t partner, const double* history) {
-      if (!history) return;
-      const int body = bodies_.body_of(tag) ? bodies_.body_of(tag) : bodies_.body_of(partner);
-      std::vector<double> h(history, history + contacts_.width());
-      contacts_.turn(h.data(), bodies_.pose(body).turn());
-      if (mine) given[*mine].push_back({partner, h});
-      if (const int* theirs = index_of_.find(partner)) given[*theirs].push_back({tag, contacts_.turned(h.data())});
+      if (!history || (partner < tag && freed_anywhere_.contains(partner))) return;
+      const Eigen::Matrix3d& turn = bodies_.pose(own ? own : bodies_.body_of(partner)).turn();
+      if (double* const h = give(mine, partner, history)) contacts_.turn(h, turn);
+      if (double* const h = give(index_of_.find(partner), tag, history)) {
+        contacts_.turn(h, turn);
+        contacts_.change_side(h);
+      }
     });
-  });
-  for (const auto& g : given) histories_.give(g.first, g.second);
+  }
+  std::sort(given.begin(), given.end(), [](const Given& a, const Given& b) { return std::tie(a.atom, a.history) < std::tie(b.atom, b.history); });
+  std::vector<ContactHistories::Contact> of_one;
+  for (std::size_t g = 0; g < given.size();) {
+    const int atom = given[g].atom;
+    of_one.clear();
+    for (; g < given.size() && given[g].atom == atom; ++g) of_one.push_back({given[g].partner, &histories[given[g].history]});
+    histories_.give(atom, of_one.data(), of_one.size());
+  }
   thawed_ = !freed_anywhere_.empty();
 }
 

@@ -50,10 +50,13 @@ class FrozenContacts {
   }
 
   /// The same history as seen from the other side.
+  void change_side(double* history) const {
+    for (std::size_t d = 0; d < width(); ++d)
+      if (flips_[d]) history[d] = -history[d];
+  }
   std::vector<double> turned(const double* history) const {
     std::vector<double> h(history, history + width());
-    for (std::size_t d = 0; d < width(); ++d)
-      if (flips_[d]) h[d] = -h[d];
+    change_side(h.data());
     return h;
   }
   bool contains(std::int64_t tag, std::int64_t partner) const;

@@ -103,9 +103,11 @@ class GranuleStore {
     if (grid == grids_.end() || surely_far(grid->second, s, gap)) return;
     const Vec3 reach = Vec3::Constant(s.radius + gap + largest_radius_);
     for_each_slot_in_box(grid->second, s.centre - reach, s.centre + reach, [&](int slot) {
+      const double apart = (position(slot) - s.centre).squaredNorm();
+      if (apart >= reach[0] * reach[0]) return;  // most, and their radii need not be read
       const Resident g = resident(slot);
       const double touch = s.radius + g.radius + gap;
-      if (touch > 0 && (g.position - s.centre).squaredNorm() < touch * touch) visit(g);
+      if (touch > 0 && apart < touch * touch) visit(g);
     });
   }
   /// Calls visit(const Resident&) for each in this frame whose centre is in the cells that overlap the box, given in that frame

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <utility>
+
+#include "parts_that_came_off.h"
 
 namespace solidcull {
 
@@ -242,11 +243,6 @@ void SolidBodies::sum_anew(int number, std::int64_t member, const FrozenContacts
 
 void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
                         const std::function<void(std::int64_t, int, const Vec3&)>& moved) {
-  struct Search {
-    std::vector<std::int64_t> reached;
-    std::size_t next = 0;
-    int joined = -1;
-  };
   std::map<int, std::vector<std::int64_t>> sources;
   for (const std::int64_t tag : cut_)
     if (const int body = body_of(tag)) sources[body].push_back(tag);
@@ -257,53 +253,9 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
     std::sort(tags.begin(), tags.end());
     tags.erase(std::unique(tags.begin(), tags.end()), tags.end());
     const bool was_grounded = bodies_[body].grounded;
-    std::vector<Search> searches(tags.size());
-    FlatMap<int> seen;
-    for (std::size_t s = 0; s < tags.size(); ++s) {
-      searches[s].reached.push_back(tags[s]);
-      seen[tags[s]] = static_cast<int>(s);
-    }
-    const auto leader = [&](int s) {
-      while (searches[s].joined >= 0) s = searches[s].joined;
-      return s;
-    };
-    std::deque<int> turns;
-    for (std::size_t s = 0; s < tags.size(); ++s) turns.push_back(static_cast<int>(s));
-    std::size_t growing = tags.size();
-    while (growing > 1) {
-      const int s = turns.front();
-      turns.pop_front();
-      if (searches[s].joined >= 0) continue;
-      Search& mine = searches[s];
-      if (mine.next < mine.reached.size()) {
-        const std::int64_t tag = mine.reached[mine.next++];
-        contacts.for_each_partner(tag, [&](std::int64_t partner) {
-          if (!is_member(partner)) return;
-          if (const int* other = seen.find(partner)) {
-            const int o = leader(*other);
-            if (o == s) return;
-            Search& theirs = searches[o];
-            // keep one queue: what is reached and done first, what is reached and waits last
-            std::vector<std::int64_t> both(mine.reached.begin(), mine.reached.begin() + static_cast<std::ptrdiff_t>(mine.next));
-            both.insert(both.end(), theirs.reached.begin(), theirs.reached.begin() + static_cast<std::ptrdiff_t>(theirs.next));
-            const std::size_t done = both.size();
-            both.insert(both.end(), mine.reached.begin() + static_cast<std::ptrdiff_t>(mine.next), mine.reached.end());
-            both.insert(both.end(), theirs.reached.begin() + static_cast<std::ptrdiff_t>(theirs.next), theirs.reached.end());
-            mine.reached = std::move(both);
-            mine.next = done;
-            theirs = Search{};
-            theirs.joined = s;
-            --growing;
-            return;
-          }
-          seen[partner] = s;
-          mine.reached.push_back(partner);
-        });
-        turns.push_back(s);
-        continue;
-      }
-      // this part is closed and others are still growing: it has come off
-      --growing;
+    for (const std::vector<std::int64_t>& part : parts_that_came_off(
+             tags, contacts, [&](std::int64_t tag) { return is_member(tag); },
+             [&](std::int64_t tag) { return mass_of(tag).position; })) {
       const int fresh = found();
       SolidBody& off = bodies_[fresh];
       SolidBody& rest = bodies_[body];
@@ -313,7 +265,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       off.changed = rest.changed = true;
       off.spans = {};
       MassProperties gone;
-      for (const std::int64_t tag : mine.reached) {
+      for (const std::int64_t tag : part) {
         const GranuleMass g = mass_of(tag);
         gone.add(g.mass, g.position, g.radius, 1, g.held);
       }
@@ -322,7 +274,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       FlatMap<int> index;
       std::vector<Vec3> place;
       const bool tied = rest.spans[0] || rest.spans[1] || rest.spans[2];
-      std::vector<std::int64_t> order = {mine.reached.front()};
+      std::vector<std::int64_t> order = {part.front()};
       index[order.front()] = 0;
       place.push_back(mass_of(order.front()).position);
       for (std::size_t at = 0; at < order.size(); ++at) {
