@@ -30,10 +30,10 @@
 namespace solidcull {
 namespace {
 
-// waking granules are handled together after so many steps: a sound wave crosses one granule in about that time
-constexpr int wake_together = 10;
+// waking granules are handled together after so many steps: a sound wave crosses one or two granules in that time
+constexpr int wake_together = 20;
 // but a load change of so many tolerances at once
-constexpr double blow = 2;
+constexpr double blow = 10;
 // pores of a packing hold no ball of this radius (in mean diameters); a hole that holds one is open to the outside
 constexpr double closing_diameters = 0.6;
 // in a run that starts with an empty box, steps between two tries to find granules to take the scales from
