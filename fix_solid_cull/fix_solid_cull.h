@@ -231,6 +231,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
     Vec3 centre;
     double radius;
   };
+  void index_atoms();
   void change_membership();
   std::vector<Ball> collect_balls();
   bool in_ball(const Vec3& x, double margin) const;
@@ -266,6 +267,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   double contact_reach() const;
   void open_for_insertion();
   void check_inserted();
+  std::vector<WallContacts::Box> insertion_boxes(bool now) const;
   void fetch_near_walls(std::set<std::int64_t>& near);
   GranuleMass mass_of(std::int64_t tag) const;
   MovingGranule moving(int i) const;

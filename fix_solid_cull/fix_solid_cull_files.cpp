@@ -20,8 +20,7 @@ const std::map<int, InterfaceMesh>& FixSolidCull::interface_meshes() {
     meshes_.clear();
     merges_.clear();
     locked_now_.clear();
-    index_of_.clear();
-    for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
+    index_atoms();
     update_meshes();
   }
   for (auto& mesh : meshes_) mesh.second.set_pose(bodies_.pose(mesh.first));

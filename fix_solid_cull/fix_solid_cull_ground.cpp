@@ -106,6 +106,7 @@ void FixSolidCull::ground_bodies() {
     set_grounded(number, true);
   }
   if (any_rank(locked_index_stale_)) {
+    index_atoms();  // they were sorted since membership changed
     settle_bodies();
     refresh_locked();
     give_velocities();

@@ -103,6 +103,12 @@ bool FixSolidCull::in_ball(const Vec3& x, double margin) const {
   });
 }
 
+void FixSolidCull::index_atoms() {
+  index_of_.clear();
+  index_of_.reserve(static_cast<std::size_t>(atom->nlocal));
+  for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
+}
+
 void FixSolidCull::change_membership() {
   const auto timed = watch_.time(Part::membership);
   if (stored_at_ >= 0 && stored_at_ != update->ntimestep) {
@@ -125,9 +131,7 @@ void FixSolidCull::change_membership() {
   freed_anywhere_.clear();
   locked_anywhere_.clear();
   if (change || comm->nprocs > 1) {
-    index_of_.clear();
-    index_of_.reserve(static_cast<std::size_t>(atom->nlocal));
-    for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
+    index_atoms();
   }
   if (change) {
     free_what_wakes(all);
@@ -493,19 +497,27 @@ void FixSolidCull::keep_shell_closed() {
   });
   fetch_near_walls(near);
   if (open_for_insertion_)
-    for (int f = 0; f < modify->nfix; ++f) {
-      if (std::strncmp(modify->fix[f]->style, "insert/pack", 11) != 0 &&
-          std::strncmp(modify->fix[f]->style, "insert/rate", 11) != 0)
-        continue;
-      const LAMMPS_NS::Region* region = engine::insertion_region(modify->fix[f]);
-      if (!region || !region->bboxflag) continue;
-      const Vec3 reach = Vec3::Constant(store_->largest_radius() + gap);
-      for_each_stored_in_box(Vec3(region->extent_xlo, region->extent_ylo, region->extent_zlo) - reach,
-                             Vec3(region->extent_xhi, region->extent_yhi, region->extent_zhi) + reach,
-                             [&](const Resident& g) { near.insert(g.tag); });
-    }
+    for (const WallContacts::Box& box : insertion_boxes(false))
+      for_each_stored_in_box(box.lo, box.hi, [&](const Resident& g) { near.insert(g.tag); });
   for (const std::int64_t tag : near) bring_back(tag);
   shell_changed_ = shell_changed_ || !near.empty();
+}
+
+/// Around the regions of the fixes that insert; of those that do so at this step or the next one, if `now`.
+std::vector<WallContacts::Box> FixSolidCull::insertion_boxes(bool now) const {
+  std::vector<WallContacts::Box> boxes;
+  const Vec3 reach = Vec3::Constant(store_->largest_radius() + neighbor->skin);
+  for (int f = 0; f < modify->nfix; ++f) {
+    const LAMMPS_NS::Fix* fix = modify->fix[f];
+    if (std::strncmp(fix->style, "insert/pack", 11) != 0 && std::strncmp(fix->style, "insert/rate", 11) != 0) continue;
+    const std::int64_t steps = fix->next_reneighbor - update->ntimestep;
+    if (now && steps != 0 && steps != 1) continue;
+    const LAMMPS_NS::Region* region = engine::insertion_region(fix);
+    if (region && region->bboxflag)
+      boxes.push_back({Vec3(region->extent_xlo, region->extent_ylo, region->extent_zlo) - reach,
+                       Vec3(region->extent_xhi, region->extent_yhi, region->extent_zhi) + reach});
+  }
+  return boxes;
 }
 
 void FixSolidCull::fetch_near_walls(std::set<std::int64_t>& near) {
@@ -596,8 +608,7 @@ void FixSolidCull::forget_lost_atoms() {
       if (!present.contains(l.tag) && bodies_.body_of(l.tag) && !store_->contains(l.tag)) lost.push_back(l);
   }
   if (!any_rank(!lost.empty())) return;
-  index_of_.clear();
-  for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
+  index_atoms();
   for (const Locked& l : lost) bodies_.unlock(l.tag, l.granule, contacts_);
   for (const Locked& l : lost) contacts_.erase(l.tag);
   split_bodies();
@@ -865,12 +876,19 @@ void FixSolidCull::store_what_is_deep(bool change) {
         self.body);
     return near;
   };
+  // what is to be inserted at this step or the next must find the bed open
+  const std::vector<WallContacts::Box> opened = insertion_boxes(true);
+  const auto is_open = [&](const Vec3& x) {
+    return std::any_of(opened.begin(), opened.end(), [&](const WallContacts::Box& box) {
+      return (x.array() >= box.lo.array()).all() && (x.array() <= box.hi.array()).all();
+    });
+  };
   std::vector<int> deep;
   stay_near_ = 0;
   for (int i = atom->nlocal - 1; i >= 0; --i) {
     // the highest tag must stay an atom: new atoms are numbered from it
     if (!shell_[i].locked || !may_leave_its_walls(shell_[i]) || atom->tag[i] == highest_anywhere) continue;
-    if (!cells.any_near(sphere(i), gap) && !near_another_body(i))
+    if (!cells.any_near(sphere(i), gap) && !near_another_body(i) && !is_open(vec(atom->x[i])))
       deep.push_back(i);
     else
       ++stay_near_;
@@ -889,7 +907,7 @@ void FixSolidCull::fit_memory() {
         index_of_, locked_index_, locked_slot_, locked_place_, riding_, fresh_contacts_, around_);
   shell_.resize(atom->nmax);
   shell_.shrink_to_fit();
-  for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
+  index_atoms();
 }
 
 void FixSolidCull::publish_atom_counts() {

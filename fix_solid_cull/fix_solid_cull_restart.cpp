@@ -323,8 +323,7 @@ void FixSolidCull::take_up_restart_state() {
     refuse("the restart file holds contact histories of " + std::to_string(static_cast<int>(state[11])) +
            " numbers and this deck's contact model has " + std::to_string(contacts_.width()) +
            ": use the contact model that the file was written with");
-  index_of_.clear();
-  for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
+  index_atoms();
   const std::vector<Block> blocks = parse_blocks(state, header_size, contacts_.width());
   const bool same_ranks = static_cast<int>(state[12]) == comm->nprocs && static_cast<int>(blocks.size()) == comm->nprocs;
   if (same_ranks && !any_rank(!is_mine(blocks[comm->me])))

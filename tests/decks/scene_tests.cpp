@@ -88,6 +88,34 @@ TEST(Scenes, ABedThatSleepsStillWeighsOnItsWalls) {
   EXPECT_LT(lowest(), before - 0.0005) << "nothing follows the floor";
 }
 
+TEST(Scenes, WhatIsInsertedIntoASleepingBedFindsItsGranules) {
+  Engine e;
+  e.run(read_bed(mesh_bed("asleep")) + "fix cull all solid/cull exterior sleep every 50\nrun 1500\n");
+  ASSERT_GT(f(e, 3), 1250);
+  // once, and more at a rate, from the middle of the bed upwards; the region reaches over the bed
+  const std::string where = " overlapcheck yes all_in yes vel constant 0 0 -0.1 region pour";
+  e.run("fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0008\n"
+        "fix dist all particledistribution/discrete 32452843 1 t1 1.0\n"
+        "region pour block 0 0.026 0 0.026 0.012 0.045\n"
+        "fix once all insert/pack seed 32452867 distributiontemplate dist maxattempt 300 insert_every once" + where +
+        " volumefraction_region 0.45\n"
+        "fix rate all insert/rate/region seed 49979687 distributiontemplate dist maxattempt 100 nparticles 60 particlerate 10000 "
+        "insert_every 100" + where + "\nrun 1000\nunfix once\nunfix rate\nunfix cull\nrun 0\n");
+  const State all = e.state();
+  EXPECT_GT(all.size(), 1350u) << "granules are inserted";
+  double deepest = 0;
+  for (auto a = all.begin(); a != all.end(); ++a)
+    for (auto b = std::next(a); b != all.end(); ++b) {
+      double apart = 0;
+      for (int d = 0; d < 3; ++d) apart += std::pow(a->second.x[d] - b->second.x[d], 2);
+      const double smaller = std::min(a->second.radius, b->second.radius);
+      deepest = std::max(deepest, (a->second.radius + b->second.radius - std::sqrt(apart)) / smaller);
+    }
+  EXPECT_LT(deepest, 0.1);
+  for (int tag = 1; tag <= 1300; ++tag) ASSERT_TRUE(all.count(tag)) << tag << " is lost";
+  if (e.rank() == 0) std::printf("%zu granules, deepest overlap %.3g radii\n", all.size(), deepest);
+}
+
 TEST(Scenes, RestartWhileCulledGoesOnAsIfItHadNotStopped) {
   const Bed bed = mesh_bed("restart");
   const std::string fix = "fix cull all solid/cull every 50 calm 2 depth 1.5\n";
