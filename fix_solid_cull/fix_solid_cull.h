@@ -205,6 +205,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
 
   // --- fix_solid_cull_look.cpp: what is in solid state, deep enough, exposed -----------------------------------------------
   void look();
+  std::vector<char> find_steady(const std::vector<char>& asked);
+  void leave_out_what_is_not_steady();
   void choose_asleep();
   bool find_calm();
   bool can_be_culled(int mask) const;
@@ -356,7 +358,6 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
     Vec3 force;
   };
   std::vector<SideChange> side_changes_;
-  FlatMap<double> normal_loads_;
   struct Touch {
     std::int64_t a, b;
   };

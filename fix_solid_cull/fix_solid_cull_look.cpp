@@ -56,6 +56,7 @@ void FixSolidCull::look() {
   const bool any_candidates = any_rank(candidates), any_locked = any_rank(!locked_index_.empty());
   chosen_.clear();
   if (!needs_surface()) {
+    leave_out_what_is_not_steady();
     choose_asleep();
     ground_bodies();
   } else if (any_candidates || any_locked) {
@@ -63,6 +64,7 @@ void FixSolidCull::look() {
     follow_with_surface();
     register_with_surface();
     choose();
+    leave_out_what_is_not_steady();
     find_exposed();
   }
   std::int64_t counts[3] = {static_cast<std::int64_t>(chosen_.size()), 0, 0};
@@ -422,6 +424,27 @@ void FixSolidCull::choose() {
   }
 }
 
+void FixSolidCull::leave_out_what_is_not_steady() {
+  std::vector<char> asked(atom->nlocal, 0);
+  if (needs_surface()) {
+    FlatMap<char> chosen;
+    for (const std::int64_t tag : chosen_) chosen[tag] = 1;
+    for (int i = 0; i < atom->nlocal; ++i) asked[i] = chosen.contains(atom->tag[i]);
+    const std::vector<char> steady = find_steady(asked);
+    for (int i = 0; i < atom->nlocal; ++i)
+      if (asked[i] && !steady[i]) chosen.erase(atom->tag[i]);
+    chosen_.erase(std::remove_if(chosen_.begin(), chosen_.end(), [&](std::int64_t tag) { return !chosen.contains(tag); }),
+                  chosen_.end());
+    return;
+  }
+  // one look before they could go, so that none is lost
+  const int from = std::max(1, settings_.calm - 1);
+  for (int i = 0; i < atom->nlocal; ++i) asked[i] = !shell_[i].locked && shell_[i].calm >= from;
+  const std::vector<char> steady = find_steady(asked);
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (asked[i] && !steady[i]) shell_[i].calm = std::min(shell_[i].calm, settings_.calm - 1);
+}
+
 void FixSolidCull::choose_asleep() {
   // whoever is in solid state sleeps, but for a cover around what is not
   overdue_.clear();
@@ -470,9 +493,6 @@ void FixSolidCull::prepare_locking() {
   for (const std::int64_t tag : chosen_) chosen[tag] = 1;
   const int owned = atom->nlocal;
   const int interface_bit = group->bitmask[interface_group_];
-  const bool loads = settings_.tolerance_relative > 0;
-  std::vector<double> normal(loads ? owned : 0, 0.0);
-  std::vector<Vec3> pair_sum(loads ? owned : 0, Vec3::Zero());
   const LAMMPS_NS::NeighList* list = force->pair->list;
   const auto will_be_locked = [&](int i) {
     return (atom->mask[i] & interface_bit) || i >= owned || chosen.contains(atom->tag[i]);
@@ -491,27 +511,53 @@ void FixSolidCull::prepare_locking() {
       if (first && second) touches_.push_back({atom->tag[i], atom->tag[j]});
       // between owned granules the force is taken in the very state that is frozen; across ranks it is taken now
       const bool side_change = first && second && j >= owned && shell_[i].locked && !(atom->mask[j] & interface_bit);
-      const bool counts = loads && ((chosen.contains(atom->tag[i])) || (j < owned && chosen.contains(atom->tag[j])));
-      if ((!side_change && !counts) || distance > radii * neighbor->contactDistanceFactor) continue;
-      const Vec3 f = pair_force_.on_first(i, k);
-      if (side_change) side_changes_.push_back({atom->tag[i], atom->tag[j], f});
-      if (!counts) continue;
-      const double n = std::abs(f.dot(vec(atom->x[i]) - vec(atom->x[j]))) / distance;
-      normal[i] += n;
-      pair_sum[i] += f;
-      if (j < owned) {
-        normal[j] += n;
-        pair_sum[j] -= f;
-      }
+      if (side_change && distance <= radii * neighbor->contactDistanceFactor)
+        side_changes_.push_back({atom->tag[i], atom->tag[j], pair_force_.on_first(i, k)});
     }
   }
-  if (!loads) return;
-  for (int i = 0; i < owned; ++i) {
-    if (!chosen.contains(atom->tag[i])) continue;
-    // what neither pairs nor weight explain is the walls'
-    const Vec3 wall = vec(atom->f[i]) - pair_sum[i] - atom->rmass[i] * gravity();
-    normal_loads_[atom->tag[i]] = normal[i] + (shell_[i].walls > 0 ? wall.norm() : 0.0);
+}
+
+/// The load on these owned granules, from look to look: one that still changes is no solid state, however slowly its granule moves.
+std::vector<char> FixSolidCull::find_steady(const std::vector<char>& asked) {
+  const int owned = atom->nlocal;
+  std::vector<double> normal(owned, 0.0);
+  std::vector<Vec3> pair_sum(owned, Vec3::Zero());
+  const LAMMPS_NS::NeighList* list = force->pair->list;
+  for (int row = 0; row < list->inum; ++row) {
+    const int i = list->ilist[row];
+    if (i >= owned) continue;
+    for (int k = 0; k < list->numneigh[i]; ++k) {
+      const int j = list->firstneigh[i][k] & NEIGHMASK;
+      if (!asked[i] && !(j < owned && asked[j])) continue;
+      const Vec3 apart = vec(atom->x[i]) - vec(atom->x[j]);
+      if (apart.norm() > (atom->radius[i] + atom->radius[j]) * neighbor->contactDistanceFactor) continue;
+      const Vec3 f = pair_force_.on_first(i, k);
+      const double n = std::abs(f.dot(apart)) / apart.norm();
+      normal[i] += n;
+      pair_sum[i] += f;
+      if (j >= owned) continue;
+      normal[j] += n;
+      pair_sum[j] -= f;
+    }
   }
+  std::vector<char> steady(owned, 0);
+  const Vec3 g = gravity();
+  for (int i = 0; i < owned; ++i) {
+    ShellEntry& e = shell_[i];
+    if (e.locked) continue;
+    if (!asked[i]) {
+      e.normal_load = ShellEntry::not_known;
+      continue;
+    }
+    // what neither pairs nor weight explain is the walls'
+    const Vec3 wall = vec(atom->f[i]) - pair_sum[i] - atom->rmass[i] * g;
+    const double load = normal[i] + (e.walls > 0 ? wall.norm() : 0.0), then = e.normal_load;
+    const double change = solid_state_.force * atom->rmass[i] * weight_scale_ +
+                          SolidStateLaw::out_of_balance_share * settings_.tolerance_relative * load;
+    steady[i] = then != ShellEntry::not_known && std::abs(load - then) <= change;
+    e.normal_load = load;
+  }
+  return steady;
 }
 
 void FixSolidCull::judge_worth(std::int64_t chosen, std::int64_t exterior) {

@@ -175,7 +175,6 @@ void FixSolidCull::change_membership() {
   open_for_insertion_ = false;
   chosen_.clear();
   side_changes_.clear();
-  normal_loads_.clear();
   touches_.clear();
   joins_.clear();
   if (!new_run_ && memory_.too_large()) fit_memory();  // walls keep pointers into the arrays over the setup of a run
@@ -266,8 +265,6 @@ void FixSolidCull::lock(int i) {
   e.lock_step = update->ntimestep;
   e.velocity = vec(atom->v[i]);
   e.spin = vec(atom->omega[i]);
-  const double* load = normal_loads_.find(atom->tag[i]);
-  e.normal_load = load ? *load : 0;
   if (!rigid()) {
     set(atom->v[i], Vec3::Zero());
     set(atom->omega[i], Vec3::Zero());
@@ -283,6 +280,7 @@ void FixSolidCull::unlock(int i) {
   e.excess = 0;
   e.calm = 0;
   e.waited = 0;
+  e.normal_load = ShellEntry::not_known;
   atom->mask[i] &= ~group->bitmask[interface_group_];
   vector_atom[i] = 0;
 }
@@ -903,7 +901,7 @@ void FixSolidCull::fit_memory() {
   memory_.fit();
   pair_force_.release();
   const auto empty = [](auto&... scratch) { ((scratch = {}), ...); };
-  empty(chosen_, side_changes_, normal_loads_, touches_, joins_, freed_, locked_now_, freed_anywhere_, locked_anywhere_, overdue_,
+  empty(chosen_, side_changes_, touches_, joins_, freed_, locked_now_, freed_anywhere_, locked_anywhere_, overdue_,
         index_of_, locked_index_, locked_slot_, locked_place_, riding_, fresh_contacts_, around_);
   shell_.resize(atom->nmax);
   shell_.shrink_to_fit();

@@ -19,7 +19,8 @@ struct ShellEntry {
   Vec3 reference = Vec3::Zero();    ///< F_ext at locking, re-based when contacts change sides; frame of the body (N). Of an
                                     ///< exterior granule: acceleration of what it touched when calm began (m/s^2)
   Vec3 load_change = Vec3::Zero();  ///< F_ext - reference at the last step; frame of the body (N)
-  double normal_load = 0;           ///< sum of normal contact forces at locking (N), for the relative tolerance
+  static constexpr double not_known = -1;
+  double normal_load = not_known;   ///< sum of normal contact forces at locking (N). Of an exterior granule: at the last look
   double excess = 0;                ///< largest load change over tolerance since the last wake-up
   std::int64_t lock_step = -1;      ///< of an exterior granule: when calm began
   bool held = false;                ///< touched a wall that stands still when it was locked
