@@ -66,6 +66,8 @@ void FixSolidCull::look() {
     choose();
     leave_out_what_is_not_steady();
     find_exposed();
+  } else {
+    leave_out_what_is_not_steady();
   }
   std::int64_t counts[3] = {static_cast<std::int64_t>(chosen_.size()), 0, 0};
   for (int i = 0; i < atom->nlocal; ++i) counts[1] += !shell_[i].locked;
@@ -425,24 +427,25 @@ void FixSolidCull::choose() {
 }
 
 void FixSolidCull::leave_out_what_is_not_steady() {
-  std::vector<char> asked(atom->nlocal, 0);
-  if (needs_surface()) {
-    FlatMap<char> chosen;
-    for (const std::int64_t tag : chosen_) chosen[tag] = 1;
-    for (int i = 0; i < atom->nlocal; ++i) asked[i] = chosen.contains(atom->tag[i]);
-    const std::vector<char> steady = find_steady(asked);
-    for (int i = 0; i < atom->nlocal; ++i)
-      if (asked[i] && !steady[i]) chosen.erase(atom->tag[i]);
-    chosen_.erase(std::remove_if(chosen_.begin(), chosen_.end(), [&](std::int64_t tag) { return !chosen.contains(tag); }),
-                  chosen_.end());
-    return;
-  }
   // one look before they could go, so that none is lost
   const int from = std::max(1, settings_.calm - 1);
-  for (int i = 0; i < atom->nlocal; ++i) asked[i] = !shell_[i].locked && shell_[i].calm >= from;
+  FlatMap<char> chosen;
+  for (const std::int64_t tag : chosen_) chosen[tag] = 1;
+  std::vector<char> asked(atom->nlocal, 0);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const int calm = shell_[i].locked ? 0 : shell_[i].calm;
+    asked[i] = needs_surface() ? calm == from || chosen.contains(atom->tag[i]) : calm >= from;
+  }
   const std::vector<char> steady = find_steady(asked);
-  for (int i = 0; i < atom->nlocal; ++i)
-    if (asked[i] && !steady[i]) shell_[i].calm = std::min(shell_[i].calm, settings_.calm - 1);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!asked[i] || steady[i]) continue;
+    if (needs_surface())
+      chosen.erase(atom->tag[i]);
+    else
+      shell_[i].calm = std::min(shell_[i].calm, settings_.calm - 1);
+  }
+  const auto left_out = [&](std::int64_t tag) { return !chosen.contains(tag); };
+  chosen_.erase(std::remove_if(chosen_.begin(), chosen_.end(), left_out), chosen_.end());
 }
 
 void FixSolidCull::choose_asleep() {
@@ -523,7 +526,8 @@ std::vector<char> FixSolidCull::find_steady(const std::vector<char>& asked) {
   std::vector<double> normal(owned, 0.0);
   std::vector<Vec3> pair_sum(owned, Vec3::Zero());
   const LAMMPS_NS::NeighList* list = force->pair->list;
-  for (int row = 0; row < list->inum; ++row) {
+  const int rows = std::find(asked.begin(), asked.end(), 1) == asked.end() ? 0 : list->inum;
+  for (int row = 0; row < rows; ++row) {
     const int i = list->ilist[row];
     if (i >= owned) continue;
     for (int k = 0; k < list->numneigh[i]; ++k) {
