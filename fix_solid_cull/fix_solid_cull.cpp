@@ -357,7 +357,8 @@ void FixSolidCull::pre_initial_integrate() {
   next_look_ = ((update->ntimestep - 1) / look_every_ + 1) * look_every_;
   if (locked_everywhere_ == 0 && !settings_.every) {
     quick_looks_ = settings_.calm;
-    next_look_ = update->ntimestep + quick_interval() - 1;
+    if (last_look_ >= update->ntimestep) last_look_ = INT32_MIN;  // time was set back
+    next_look_ = std::max(update->ntimestep, last_look_ + quick_interval());
   }
   no_cull_until_ = -1;
   worth_ = WorthWatch();

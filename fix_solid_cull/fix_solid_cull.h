@@ -431,7 +431,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::int64_t restored_then_ = 0;  // granules restored until then
   bool told_no_worth_ = false;
   int quick_looks_ = 0;  // left at the start of a run in which nothing is culled yet
-  std::int64_t next_look_ = -1;
+  std::int64_t next_look_ = -1, last_look_ = INT32_MIN;
   std::int64_t membership_version_ = 0;
   double largest_excess_ = 0;
   std::vector<double> restart_state_;

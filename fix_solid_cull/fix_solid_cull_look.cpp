@@ -595,7 +595,7 @@ void FixSolidCull::ask_for_build(std::int64_t step) {
 
 void FixSolidCull::schedule_next_look() {
   // a bed that rests when the run begins is culled at once; else a look comes in time for what it must watch
-  const std::int64_t now = update->ntimestep;
+  const std::int64_t now = last_look_ = update->ntimestep;
   if (quick_looks_ > 0 && locked_everywhere_ == 0) {
     --quick_looks_;
     next_look_ = now + quick_interval();
