@@ -278,12 +278,12 @@ def figures_of(scene, kind, text, made_bed, final, loads):
     return figures
 
 
-def one_run(scene, size, kind, k, settings):
-    """The figures of a run: kept ones, when they are of the same decks, bed and launcher; else it runs."""
+def one_run(scene, size, kind, k, settings, of=""):
+    """The figures of a run: kept ones, when they are of the same decks, bed and launcher; else it runs. of: goes into its name."""
     made_bed = bed(size)
     place = OUT / "runs"
     place.mkdir(exist_ok=True)
-    name = "-".join([scene, size, kind, str(k + 1)])
+    name = "-".join([scene, size, kind, *([of] if of else []), str(k + 1)])
     kept, deck, final = place / f"{name}.json", place / f"{name}.in", place / f"{name}.final"
     elements = place / f"{name}-floor-*.vtk"
     copies = BEDS[size][0]
@@ -330,10 +330,16 @@ def steady_mb(run):
     return statistics.median(rows)
 
 
+def own_time(run):
+    """Seconds of the loop in which the run had a core: what others on the machine took is not in it."""
+    return run["loop_time"] * min(1.0, run["cpu"] / run["wall"])
+
+
 def summary(runs):
     first = runs[0]
-    result = {"runs": [r["name"] for r in runs], "loop_times": [r["loop_time"] for r in runs],
-              "loop_time": statistics.median(r["loop_time"] for r in runs), "steps": first["steps"], "granules": first["granules"],
+    result = {"runs": [r["name"] for r in runs], "loop_times": [r["loop_time"] for r in runs], "own_times": list(map(own_time, runs)),
+              "loop_time": statistics.median(r["loop_time"] for r in runs), "own_time": statistics.median(map(own_time, runs)),
+              "steps": first["steps"], "granules": first["granules"],
               "peak_mb": max(r["peak_mb"] for r in runs), "steady_mb": statistics.median(map(steady_mb, runs))}
     result["granule_steps_per_s"] = first["granules"] * first["steps"] / result["loop_time"]
     if "exterior" in first:
@@ -347,7 +353,7 @@ def summary(runs):
 def compared(runs, kind):
     """Speed-up and errors of one kind against the unculled runs."""
     unculled, own = runs["unculled"], runs[kind]
-    result = {"speed_up": statistics.median(r["loop_time"] for r in unculled) / max(1e-9, statistics.median(r["loop_time"] for r in own))}
+    result = {"speed_up": statistics.median(map(own_time, unculled)) / max(1e-9, statistics.median(map(own_time, own)))}
     if kind == "culled":
         result["over_exterior"] = unculled[0]["granules"] / statistics.fmean(r["exterior"] for r in own)
         result["efficiency"] = result["speed_up"] / result["over_exterior"]
@@ -368,7 +374,7 @@ def compared(runs, kind):
 
 
 def table(report):
-    lines = [f"{'size':>6} {'kind':>9} {'runs':>4} {'loop (s)':>10} {'speed-up':>8} {'N / exterior':>12} {'efficiency':>10} "
+    lines = [f"{'size':>6} {'kind':>9} {'runs':>4} {'loop (s)':>10} {'on a core':>10} {'speed-up':>8} {'N / exterior':>12} {'efficiency':>10} "
              f"{'M granule-steps/s':>17} {'peak (kB/granule)':>17} {'steady':>7}"]
     for size, of_size in report.items():
         for kind, s in of_size["kinds"].items():
@@ -376,7 +382,7 @@ def table(report):
 
             def cell(key, width, form):
                 return f"{format(c[key], form) if key in c else '-':>{width}}"
-            lines.append(f"{size:>6} {kind:>9} {len(s['runs']):>4} {s['loop_time']:>10.1f} {cell('speed_up', 8, '.2f')} "
+            lines.append(f"{size:>6} {kind:>9} {len(s['runs']):>4} {s['loop_time']:>10.1f} {s['own_time']:>10.1f} {cell('speed_up', 8, '.2f')} "
                          f"{cell('over_exterior', 12, '.1f')} {cell('efficiency', 10, '.2f')} {s['granule_steps_per_s'] / 1e6:>17.2f} "
                          f"{1024 * s['peak_mb'] / s['granules']:>17.2f} {1024 * s['steady_mb'] / s['granules']:>7.2f}")
     for size, of_size in report.items():
