@@ -463,9 +463,30 @@ void FixSolidCull::keep_shell_closed() {
   const auto timed = watch_.time(Part::shell);
   const double gap = neighbor->skin;
   std::set<std::int64_t> near;
-  // exterior granules, and the shells of other bodies
+  struct Frame {
+    int number, own;
+    bool stands;
+    const Pose* pose;
+    Vec3 middle, half;  // of a box around its stored granules, in the world
+  };
+  std::vector<Frame> frames;
   bool some_move = false;  // of the bodies that have stored granules
-  store_->for_each_frame([&](int frame, const Vec3&, const Vec3&) { some_move = some_move || !frame_stands(frame); });
+  Vec3 lo = Vec3::Constant(HUGE_VAL), hi = -lo;
+  store_->for_each_frame([&](int frame, const Vec3& own_lo, const Vec3& own_hi) {
+    const Pose& pose = pose_of_frame(frame);
+    const Vec3 half = turned_half_box(pose.turn(), 0.5 * (own_hi - own_lo)) + Vec3::Constant(store_->largest_radius() + gap);
+    frames.push_back({frame, frame == GranuleStore::shared_frame ? -1 : key_of(frame), frame_stands(frame), &pose,
+                      pose.to_world(0.5 * (own_lo + own_hi)), half});
+    some_move = some_move || !frames.back().stands;
+    lo = lo.cwiseMin(frames.back().middle - half);
+    hi = hi.cwiseMax(frames.back().middle + half);
+  });
+  const auto far_from_all = [&](const Vec3& x, double radius) {
+    for (const Vec3& shift : halo_.image_shifts())
+      if (((x + shift).array() >= lo.array() - radius).all() && ((x + shift).array() <= hi.array() + radius).all()) return false;
+    return true;
+  };
+  // exterior granules, and the shells of other bodies
   std::vector<Foreign> visitors;
   std::vector<Sphere> places;
   const auto comes = [&](const Foreign& v) {
@@ -473,26 +494,22 @@ void FixSolidCull::keep_shell_closed() {
     visitors.push_back(v);
     places.push_back(v.sphere);
   };
-  for (const Foreign& v : halo_foreign_) comes(v);
+  for (const Foreign& v : halo_foreign_)
+    if (!far_from_all(v.sphere.centre, v.sphere.radius)) comes(v);
   for (int i = 0; i < atom->nlocal; ++i)
-    if (!shell_[i].locked || store_bodies_ > 1) comes(as_foreign(i));
+    if ((!shell_[i].locked || store_bodies_ > 1) && !far_from_all(vec(atom->x[i]), atom->radius[i])) comes(as_foreign(i));
   SphereCells cells;
   cells.build(std::move(places), 2 * diameter_ + gap);
-  store_->for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
-    const Pose& pose = pose_of_frame(frame);
-    const int own = frame == GranuleStore::shared_frame ? -1 : key_of(frame);
-    const bool stands = frame_stands(frame);
-    const Vec3 middle = pose.to_world(0.5 * (lo + hi));
-    const Vec3 half = turned_half_box(pose.turn(), 0.5 * (hi - lo)) +
-                      Vec3::Constant(store_->largest_radius() + cells.largest_radius() + gap);
+  for (const Frame& f : frames) {
+    const Vec3 half = f.half + Vec3::Constant(cells.largest_radius());
     for (const Vec3& shift : halo_.image_shifts())
-      cells.for_each_in_box(middle - half - shift, middle + half - shift, [&](std::size_t v, const Sphere& s) {
-        if (visitors[v].body != own && !(stands && visitors[v].stands))
-          store_->for_each_near(frame, {pose.to_frame(s.centre + shift), s.radius}, gap,
+      cells.for_each_in_box(f.middle - half - shift, f.middle + half - shift, [&](std::size_t v, const Sphere& s) {
+        if (visitors[v].body != f.own && !(f.stands && visitors[v].stands))
+          store_->for_each_near(f.number, {f.pose->to_frame(s.centre + shift), s.radius}, gap,
                                 [&](const Resident& g) { near.insert(g.tag); });
         return true;
       });
-  });
+  }
   fetch_near_walls(near);
   if (open_for_insertion_)
     for (const WallContacts::Box& box : insertion_boxes(false))
@@ -784,7 +801,8 @@ void FixSolidCull::thaw_contacts() {
       }
     });
   }
-  std::sort(given.begin(), given.end(), [](const Given& a, const Given& b) { return std::tie(a.atom, a.history) < std::tie(b.atom, b.history); });
+  std::sort(given.begin(), given.end(),
+            [](const Given& a, const Given& b) { return std::tie(a.atom, a.history) < std::tie(b.atom, b.history); });
   std::vector<ContactHistories::Contact> of_one;
   for (std::size_t g = 0; g < given.size();) {
     const int atom = given[g].atom;
@@ -901,8 +919,8 @@ void FixSolidCull::fit_memory() {
   memory_.fit();
   pair_force_.release();
   const auto empty = [](auto&... scratch) { ((scratch = {}), ...); };
-  empty(chosen_, side_changes_, touches_, joins_, freed_, locked_now_, freed_anywhere_, locked_anywhere_, overdue_,
-        index_of_, locked_index_, locked_slot_, locked_place_, riding_, fresh_contacts_, around_);
+  empty(chosen_, side_changes_, touches_, joins_, freed_, locked_now_, freed_anywhere_, locked_anywhere_, overdue_, index_of_,
+        locked_index_, locked_slot_, locked_place_, riding_, fresh_contacts_, around_);
   shell_.resize(atom->nmax);
   shell_.shrink_to_fit();
   index_atoms();

@@ -65,7 +65,7 @@ BLOCK = deck(
     "create_atoms 1 region fill",
     "set group all diameter 0.003 density 2500",
     box="block 0 0.021 0 0.021 -0.001 0.06")
-CULL_BLOCK = FIX + " every 10 calm 1 depth 1 speed 0.5 tolerance 30 0"
+CULL_BLOCK = FIX + " every 10 calm 1 exterior live depth 1 speed 0.5 tolerance 30 0"
 
 POUR = deck(
     *[f"fix {d}{k} all wall/gran model hertz tangential history primitive type 1 {d}plane {x}"
@@ -255,7 +255,7 @@ class KeywordRefusals(Case):
                 self.refused_by_fix(deck(f"{FIX} {words}", granules=False), f"keyword '{keyword}' {what}: give {wanted}")
 
     def test_no_cover_below_a_live_surface(self):
-        for words in ("depth 0", "exterior live depth 0", "depth 0 exterior live"):
+        for words in ("exterior live depth 0", "depth 0 exterior live"):
             with self.subTest(words):
                 self.refused_by_fix(deck(f"{FIX} {words}", granules=False),
                                     "keyword 'depth' has the value '0' and 'exterior' the value 'live': give a cover of more than 0, "
@@ -268,7 +268,7 @@ class KeywordRefusals(Case):
         self.refused_by_fix(deck(FIX + " detph 2", granules=False), f"unknown keyword 'detph': choose from {self.KEYWORDS}")
 
     def test_voxel_too_coarse_for_depth(self):
-        self.refused_by_fix(deck(FIX + " depth 1.5 voxel 2", granules=False),
+        self.refused_by_fix(deck(FIX + " exterior live depth 1.5 voxel 2", granules=False),
                             "voxel 2.0 is too coarse for depth 1.5: choose voxel <= depth/2")
 
 

@@ -147,7 +147,7 @@ Eigen::Matrix3d flight(const State& s, double seconds) {
   return r;
 }
 
-const char* all_locked = "fix cull all solid/cull depth 0.25 voxel 0.125 every 50 calm 2 tolerance 1e9 0\n";
+const char* all_locked = "fix cull all solid/cull exterior live depth 0.25 voxel 0.125 every 50 calm 2 tolerance 1e9 0\n";
 
 TEST(Motion, FreeFlightKeepsMomentumAndTurnsAsARigidBodyDoes) {
   Engine never;  // the same mass up to the step in which the other one is locked
@@ -290,7 +290,7 @@ TEST(Motion, LedgerInFlight) {
     momenta += g.second.mass * eigen(g.second.v).norm();
     turnings += g.second.mass * eigen(g.second.x).cross(eigen(g.second.v)).norm();
   }
-  e.run("fix cull all solid/cull depth 0.25 voxel 0.125 every 25 calm 2 carve 1.5 2\nrun 0\n");
+  e.run("fix cull all solid/cull exterior live depth 0.25 voxel 0.125 every 25 calm 2 carve 1.5 2\nrun 0\n");
   double worst[2] = {0, 0}, most_bodies = 0, mass_off = 0;
   for (int k = 0; k < 150; ++k) {
     e.run("run 20 pre no post no\n");
@@ -320,7 +320,7 @@ TEST(Motion, AMassFallsOnTheFloorAndNothingGoesThrough) {
   e.run(read_bed(bed) +
         "run 0\nunfix grav\nfix visc all viscous 0.002\nrun 6000\nunfix visc\nvelocity all set 0 0 0\n"
         "set group all omegax 0 omegay 0 omegaz 0\ndisplace_atoms all move 0 0 0.03 units box\n"
-        "fix cull all solid/cull every 50 calm 2 depth 1.5\nrun 300\n");
+        "fix cull all solid/cull exterior live every 50 calm 2 depth 1.5\nrun 300\n");
   EXPECT_GT(e.vector("cull", 3), 200) << "it hangs in the air as one mass";
   e.run("fix grav all gravity 9.81 vector 0 0 -1\nrun 500\n");
   const double falling = e.vector("cull", 3);
@@ -369,7 +369,7 @@ TEST(Motion, ABodyThatLosesItsSupportFalls) {
   Bed bed;
   bed.name = "support";
   Engine e;
-  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.5\nrun 500\n");
+  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.5\nrun 500\n");
   ASSERT_GT(e.vector("cull", 3), 100);
   const auto height = [&] {
     double mass = e.vector("cull", 5), moment = mass * e.vector("cull", 22);

@@ -25,7 +25,7 @@ TEST_P(NoOp, ForcesHistoriesAndFuture) {
   Engine never;
   never.run(deck + looks);
   Engine culled;
-  culled.run(deck + "fix cull all solid/cull every 50 calm 2 speed 0.05 tolerance 12 0 " + GetParam().cover + "\n" + looks);
+  culled.run(deck + "fix cull all solid/cull exterior live every 50 calm 2 speed 0.05 tolerance 12 0 " + GetParam().cover + "\n" + looks);
   const double interior = culled.vector("cull", 3), interface = culled.vector("cull", 2);
   EXPECT_GT(interior, 0.1 * bed.granules) << "nothing was stored: the test shows nothing";
   EXPECT_GT(interface, 0.05 * bed.granules);

@@ -38,7 +38,7 @@ TEST(Scenes, WallLoadsOfABedAtRest) {
   Engine e;
   e.run(read_bed(mesh_bed("loads")) + "run 50\n");
   const double floor = e.vector("floor", 3), side = e.vector("side", 1), friction = e.vector("side", 3);
-  e.run("fix cull all solid/cull every 50 calm 2 depth 1.5\nrun 1000\n");
+  e.run("fix cull all solid/cull exterior live every 50 calm 2 depth 1.5\nrun 1000\n");
   ASSERT_GT(f(e, 3), 100);
   EXPECT_NEAR(e.vector("floor", 3), floor, 1e-3 * std::abs(floor));
   EXPECT_NEAR(e.vector("side", 1), side, 1e-3 * std::abs(side));
@@ -118,7 +118,7 @@ TEST(Scenes, WhatIsInsertedIntoASleepingBedFindsItsGranules) {
 
 TEST(Scenes, RestartWhileCulledGoesOnAsIfItHadNotStopped) {
   const Bed bed = mesh_bed("restart");
-  const std::string fix = "fix cull all solid/cull every 50 calm 2 depth 1.5\n";
+  const std::string fix = "fix cull all solid/cull exterior live every 50 calm 2 depth 1.5\n";
   // something that moves: granules rain onto the culled bed
   const std::string rain =
       "create_atoms 1 single 0.013 0.013 0.06\ncreate_atoms 1 single 0.017 0.013 0.065\n"
@@ -147,7 +147,7 @@ TEST(Scenes, FinesPouredOnACoarseBedNeverTouchAnInteriorGranule) {
   bed.name = "coarse";
   bed.granules = 700;
   Engine e;
-  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.0 tolerance 3 0\nrun 300\n");
+  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.0 tolerance 3 0\nrun 300\n");
   const double before = f(e, 3);
   ASSERT_GT(before, 30);
   // 10:1: granules of 0.13 mm radius fall through the pores (type 2's material, stiff enough for 1e-6 s)
@@ -204,7 +204,7 @@ double load_change_at_wake_up(double plate_speed) {
   e.run(bed.extra + "fix down all move/mesh mesh plate linear 0 0 -0.02\nfix visc all viscous 0.002\nrun 0\n");
   while (e.vector("plate", 3) < 0.2) e.run("run 20 pre no post no\n");
   e.run(
-      "unfix down\nrun 4000\nunfix visc\nrun 1000\nfix cull all solid/cull every 50 calm 2 depth 1.5 tolerance 1 0\nrun 1000\n");
+      "unfix down\nrun 4000\nunfix visc\nrun 1000\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.5 tolerance 1 0\nrun 1000\n");
   EXPECT_GT(f(e, 3), 100);
   EXPECT_EQ(f(e, 8), 0);
   const double before = e.vector("plate", 3);
@@ -246,7 +246,7 @@ TEST(Scenes, ABlowOfGivenExcessCarvesTheBallsOfTheLaw) {
   const State whole = e.state();
   double mean_diameter = 0;
   for (const auto& g : whole) mean_diameter += 2 * g.second.radius / static_cast<double>(whole.size());
-  e.run("fix cull all solid/cull every 50 calm 2 depth 1.5 tolerance 3 0 carve 1.5 4\nrun 300\n");
+  e.run("fix cull all solid/cull exterior live every 50 calm 2 depth 1.5 tolerance 3 0 carve 1.5 4\nrun 300\n");
   ASSERT_EQ(f(e, 8), 0);
   const int bit = e.group_bit("cull_interface");
   const State before = e.state();
@@ -302,7 +302,7 @@ TEST(Scenes, TheRegionHoldsTheBodiesAndNothingElse) {
   const Bed bed = mesh_bed("region");
   Engine e;
   e.run(read_bed(bed) +
-        "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.5\nrun 500\nrun 0\nregion solid interface/mesh cull\n"
+        "run 0\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.5\nrun 500\nrun 0\nregion solid interface/mesh cull\n"
         "region rest interface/mesh cull side out\ngroup held region solid\nvariable held equal count(held)\n"
         "variable both equal count(all,solid)+count(all,rest)\nvariable one atom 1\ncompute inside all reduce/region solid sum "
         "v_one\n"
@@ -318,7 +318,7 @@ TEST(Scenes, GravityThatTurnsWakesEverything) {
   Bed bed;
   bed.name = "gravity";
   Engine e;
-  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.5\nrun 500\n");
+  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.5\nrun 500\n");
   ASSERT_GT(f(e, 3), 100);
   e.run("unfix grav\nfix grav all gravity 9.81 vector 0.6 0 -1\nrun 30\n");
   EXPECT_EQ(f(e, 3), 0);
@@ -329,7 +329,7 @@ TEST(Scenes, AWallThatGoesWakesWhatTouchedIt) {
   Bed bed;
   bed.name = "wall";
   Engine e;
-  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.5\nrun 500\n");
+  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.5\nrun 500\n");
   const double before = f(e, 3);
   ASSERT_GT(before, 100);
   e.run("unfix x2\nrun 500\n");
@@ -355,7 +355,7 @@ TEST(Scenes, ARunThatStartsWithAnEmptyBoxIsCulledToo) {
 TEST(Scenes, GranulesLeaveByTheStoreAndComeBackWithTheirIds) {
   const Bed bed = mesh_bed("ids");
   Engine e;
-  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull every 50 calm 2 depth 1.5\nrun 500\n");
+  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.5\nrun 500\n");
   const State atoms = e.state();
   EXPECT_TRUE(atoms.count(1300)) << "the highest tag must stay an atom: new atoms are numbered from it";
   ASSERT_GT(f(e, 3), 100);

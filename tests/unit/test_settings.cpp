@@ -61,6 +61,7 @@ void expect_same(const Settings& a, const Settings& b) {
 TEST(Settings, a_sleeping_surface_needs_no_cover) {
   EXPECT_EQ(parsed("exterior sleep").exterior, Exterior::sleep);
   EXPECT_EQ(parsed("exterior sleep").depth, 0.0);
+  EXPECT_EQ(parsed("exterior live").depth, 2.0);
   EXPECT_EQ(parsed("exterior sleep depth 1.5").depth, 1.5);
   EXPECT_EQ(parsed("depth 1.5 exterior sleep").depth, 1.5);
 }
@@ -68,10 +69,10 @@ TEST(Settings, a_sleeping_surface_needs_no_cover) {
 TEST(Settings, without_keywords_are_the_defaults) {
   const Settings s = parsed("");
   EXPECT_EQ(s.every, 0);
-  EXPECT_EQ(s.depth, 2.0);
-  EXPECT_EQ(s.exterior, Exterior::live);
+  EXPECT_EQ(s.depth, 0.0);
+  EXPECT_EQ(s.exterior, Exterior::sleep);
   EXPECT_EQ(s.speed, 0.01);
-  EXPECT_EQ(s.calm, 3);
+  EXPECT_EQ(s.calm, 4);
   EXPECT_EQ(s.tolerance_absolute, 3.0);
   EXPECT_EQ(s.tolerance_relative, 0.0);
   EXPECT_EQ(s.carve_radius, 2.0);
@@ -89,6 +90,7 @@ TEST(Settings, every_keyword_is_parsed) {
   Settings due;
   due.every = 40;
   due.depth = 3.5;
+  due.exterior = Exterior::live;
   due.speed = 1e-3;
   due.calm = 5;
   due.tolerance_absolute = 0.5;
@@ -175,7 +177,7 @@ const Refusal refusals[] = {
     {"every", "keyword 'every' ends too early: give a whole number of steps, 1 or more"},
     {"every calm 3", "keyword 'every' has the value 'calm': give a whole number of steps, 1 or more"},
 
-    {"depth 0",
+    {"exterior live depth 0",
      "keyword 'depth' has the value '0' and 'exterior' the value 'live': give a cover of more than 0, or say 'exterior sleep'"},
     {"depth -1", "keyword 'depth' has the value '-1': give a number of mean diameters, 0 to 50"},
     {"depth 51", "keyword 'depth' has the value '51': give a number of mean diameters, 0 to 50"},
@@ -240,9 +242,9 @@ const Refusal refusals[] = {
     {"bed 10", "keyword 'bed' ends too early: give a file name that ends with .vtp"},
     {"bed 10 a.vdb", "keyword 'bed' has the value 'a.vdb': give a file name that ends with .vtp"},
 
-    {"voxel 1.5 depth 2", "voxel 1.5 is too coarse for depth 2.0: choose voxel <= depth/2"},
-    {"voxel 2", "voxel 2.0 is too coarse for depth 2.0: choose voxel <= depth/2"},
-    {"depth 0.8", "voxel 0.5 is too coarse for depth 0.8: choose voxel <= depth/2"},
+    {"exterior live voxel 1.5 depth 2", "voxel 1.5 is too coarse for depth 2.0: choose voxel <= depth/2"},
+    {"exterior live voxel 2", "voxel 2.0 is too coarse for depth 2.0: choose voxel <= depth/2"},
+    {"depth 0.8 exterior live", "voxel 0.5 is too coarse for depth 0.8: choose voxel <= depth/2"},
 
     {"deptth 2",
      "unknown keyword 'deptth': choose from bed, calm, carve, depth, every, exterior, mesh, motion, restore, speed, store, "
