@@ -241,7 +241,7 @@ void FixSolidCull::find_scales() {
                   settings_.calm};
   wake_up_ = {settings_.tolerance_absolute, settings_.tolerance_relative, weight_scale_, settings_.carve_radius * d,
               settings_.carve_cap};
-  if (!store_) store_ = std::make_unique<GranuleStore>(2 * d);
+  if (!store_) make_store();
   if (!surface_)
     surface_ = std::make_unique<ImplicitSurface>(
         settings_.voxel * d, closing(), [this](const Vec3& lo, const Vec3& hi, const std::function<void(const Sphere&)>& visit) {
@@ -414,8 +414,8 @@ void FixSolidCull::check_invariants() {
   // every locked granule is a member of a body, and nothing else is
   std::size_t locked = store_->size();
   for (int i = 0; i < atom->nlocal; ++i) locked += shell_[i].locked;
-  if (locked != bodies_.locked())
-    broken(std::to_string(bodies_.locked()) + " granules are in bodies and " + std::to_string(locked) + " are locked");
+  if (locked != locked_here())
+    broken(std::to_string(locked_here()) + " granules are in bodies and " + std::to_string(locked) + " are locked");
   // and each body has the count, mass and first moment of its granules
   std::map<int, MassProperties> sums;
   for (int i = 0; i < atom->nlocal; ++i) {
@@ -611,7 +611,7 @@ void FixSolidCull::sum_carried() {
 }
 
 double FixSolidCull::memory_usage() {
-  double bytes = static_cast<double>(shell_.capacity() * sizeof(ShellEntry) + contacts_.memory_bytes());
+  double bytes = static_cast<double>(shell_.capacity() * sizeof(ShellEntry) + contacts_.memory_bytes() + bodies_.member_bytes());
   if (store_) bytes += static_cast<double>(store_->memory_bytes());
   return bytes;
 }

@@ -112,6 +112,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
 
   bool rigid() const { return settings_.motion == Motion::rigid; }
   bool sleeping() const { return settings_.exterior == Exterior::sleep; }
+  bool compact() const { return settings_.store == Store::compact; }
   bool needs_surface() const { return settings_.exterior == Exterior::live; }
 
   // --- fix_solid_cull_bodies.cpp: how solid bodies move -------------------------------------------------------------------
@@ -262,6 +263,10 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void clear_map();
   int bring_back(std::int64_t tag);
   void put_away(int i);
+  void entered_store(std::int64_t tag);
+  void leaves_store(std::int64_t tag);
+  void make_store();
+  std::size_t locked_here() const;
   void change_of_stored(const StoredGranule& g, int sign);
   bool may_leave_its_walls(const ShellEntry& e) const;
   void restore_all();
@@ -418,6 +423,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::vector<std::size_t> riding_;  // those of them whose bodies move
   bool locked_index_stale_ = true;
   std::vector<int> motion_words_;  // of a record: what is of no worth once a step has passed
+  // lock_step in a compact store, which needs to know no more
+  static constexpr std::int64_t locked_long_ago = -1, locked_as_it_was_stored = -2;
   std::int64_t stored_at_ = -1;    // step in which granules last went into the store
   bool lists_are_new_ = false;
   bool map_cleared_ = false;

@@ -111,13 +111,19 @@ std::vector<double> FixSolidCull::serialise(const std::vector<std::int64_t>& sto
   }
   Writer edges;
   double count = 0;
-  contacts_.for_each_contact([&](std::int64_t low, std::int64_t high, const double* history) {
-    if (!all && !named.contains(low) && !named.contains(high)) return;
+  const auto edge = [&](std::int64_t low, std::int64_t high, const double* history) {
     const int body = bodies_.body_of(low) ? bodies_.body_of(low) : bodies_.body_of(high);
     for (const double x : {double(low), double(high), double(index_of(body)), double(history != nullptr)}) edges.number(x);
     if (history) edges.numbers(history, contacts_.width());
     ++count;
+  };
+  contacts_.for_each_contact([&](std::int64_t low, std::int64_t high, const double* history) {
+    if (all || named.contains(low) || named.contains(high)) edge(low, high, history);
   });
+  for (const std::int64_t tag : stored)
+    contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) {
+      if (partner > tag || !named.contains(partner)) edge(std::min(tag, partner), std::max(tag, partner), nullptr);
+    });
   const auto part = [&](double n, Writer& from) {
     w.number(n);
     const std::vector<double> x = from.take();
@@ -189,6 +195,10 @@ std::vector<FixSolidCull::Block> FixSolidCull::parse_blocks(const std::vector<do
         s.walls = static_cast<int>(in.whole());
         s.held = g.held;
         s.load_change = in.vector();
+        if (compact()) {
+          s = GranuleStore::rounded(s);
+          s.lock_step = std::min(s.lock_step, locked_long_ago);
+        }
         g.record = in.numbers(static_cast<std::size_t>(g.length));
       }
       b.granules.emplace(tag, g);
@@ -247,7 +257,11 @@ void FixSolidCull::take_up_as_it_was(const Block& b) {
       e.load_change = pose.turned_to_frame(e.load_change);
     }
   }
-  for (const Block::Edge& e : b.edges) contacts_.add(e.low, e.high, e.history.empty() ? nullptr : e.history.data());
+  for (const Block::Edge& e : b.edges)
+    if (!compact() || !store_->contains(e.low) || !store_->contains(e.high))
+      contacts_.add(e.low, e.high, e.history.empty() ? nullptr : e.history.data());
+  for (const auto& [tag, g] : b.granules)
+    if (g.record) entered_store(tag);
   group_bodies();
 }
 
@@ -300,6 +314,7 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
       s.body = at.body;
       s.load_change = to.pose.turned_to_frame(from.pose.turned_to_world(s.load_change));
       store_->add(s, t.granule->record, t.granule->length);
+      entered_store(tag);
       if (sleeping()) change_of_stored(s, +1);
       ledger_.stored(s);
     } else if (i && shell_[*i].body == 0) {
@@ -369,7 +384,14 @@ void FixSolidCull::hand_over() {
   // they leave this rank's part of their bodies; contacts with what stays are kept
   std::vector<std::int64_t> leaving = atoms;
   leaving.insert(leaving.end(), stored.begin(), stored.end());
-  for (const std::int64_t tag : leaving) bodies_.unlock(tag, mass_of(tag), contacts_);
+  std::vector<GranuleMass> masses;
+  for (const std::int64_t tag : leaving) masses.push_back(mass_of(tag));
+  std::vector<double> record;
+  for (const std::int64_t tag : stored) {
+    leaves_store(tag);
+    ledger_.returned(store_->take(tag, record));
+  }
+  for (std::size_t k = 0; k < leaving.size(); ++k) bodies_.unlock(leaving[k], masses[k], contacts_);
   for (const std::int64_t tag : atoms) shell_[*index_of_.find(tag)].body = -1;
   for (const std::int64_t tag : leaving) {
     struct Kept {
@@ -384,8 +406,6 @@ void FixSolidCull::hand_over() {
     for (const Kept& c : kept) contacts_.add(c.tag, c.partner, c.history.empty() ? nullptr : c.history.data());
   }
   split_bodies();
-  std::vector<double> record;
-  for (const std::int64_t tag : stored) ledger_.returned(store_->take(tag, record));
   take_up(parse_blocks(blocks, 0, contacts_.width()));
   publish_restored();
 }

@@ -10,9 +10,6 @@ namespace {
 
 constexpr std::uint32_t empty_entry = UINT32_MAX;
 
-/// A granule's row: what is below, then its engine record. Tag, radius and mass come first, as key words.
-constexpr int record_begin = 10;
-
 std::uint64_t bits_of(double x) {
   std::uint64_t word;
   std::memcpy(&word, &x, sizeof word);
@@ -30,23 +27,43 @@ std::uint64_t pair_of(int low, int high) {
 
 std::uint64_t tag_word(std::int64_t tag) { return bits_of(static_cast<double>(tag)); }
 
-std::array<std::uint64_t, record_begin> head_of_row(const StoredGranule& g) {
-  return {tag_word(g.tag),
-          bits_of(g.radius),
-          bits_of(g.mass),
-          pair_of(g.type, g.layout),
-          static_cast<std::uint64_t>(g.lock_step),
-          bits_of(g.normal_load),
-          bits_of(g.load_change[0]),
-          bits_of(g.load_change[1]),
-          bits_of(g.load_change[2]),
-          pair_of(g.walls, g.held)};
+/// Two floats in one word.
+std::uint64_t word_of(double low, double high) {
+  const float pair[] = {static_cast<float>(low), static_cast<float>(high)};
+  std::uint64_t word;
+  std::memcpy(&word, pair, sizeof word);
+  return word;
+}
+std::array<double, 2> floats_of(std::uint64_t word) {
+  float pair[2];
+  std::memcpy(pair, &word, sizeof word);
+  return {pair[0], pair[1]};
 }
 
 }  // namespace
 
-GranuleStore::GranuleStore(double cell) : inverse_cell_(1.0 / cell) {
+GranuleStore::GranuleStore(double cell, Loads loads) : inverse_cell_(1.0 / cell), loads_(loads) {
   if (!(cell > 0) || !std::isfinite(cell)) throw std::invalid_argument("granule store: the cell size must be positive");
+}
+
+StoredGranule GranuleStore::rounded(StoredGranule granule) {
+  granule.normal_load = static_cast<float>(granule.normal_load);
+  granule.load_change = granule.load_change.cast<float>().cast<double>();
+  return granule;
+}
+
+auto GranuleStore::head_of_row(const StoredGranule& g) const -> Head {
+  Head head{tag_word(g.tag), bits_of(g.radius), bits_of(g.mass), pair_of(g.type, g.layout),
+            static_cast<std::uint64_t>(g.lock_step)};
+  if (loads_ == Loads::exact) {
+    head[5] = bits_of(g.normal_load);
+    for (int d = 0; d < 3; ++d) head[6 + d] = bits_of(g.load_change[d]);
+  } else {
+    head[5] = word_of(g.normal_load, g.load_change[0]);
+    head[6] = word_of(g.load_change[1], g.load_change[2]);
+  }
+  head[9] = pair_of(g.walls, g.held);
+  return head;
 }
 
 // ------------------------------------------------------------------------------------------------------------------ in and out
@@ -127,8 +144,14 @@ StoredGranule GranuleStore::granule(int s) const {
   g.body = slots_[s].body;
   g.layout = static_cast<int>(row[3] >> 32);
   g.lock_step = static_cast<std::int64_t>(row[4]);
-  g.normal_load = number_of(row[5]);
-  g.load_change = Vec3(number_of(row[6]), number_of(row[7]), number_of(row[8]));
+  if (loads_ == Loads::exact) {
+    g.normal_load = number_of(row[5]);
+    g.load_change = Vec3(number_of(row[6]), number_of(row[7]), number_of(row[8]));
+  } else {
+    const auto first = floats_of(row[5]), second = floats_of(row[6]);
+    g.normal_load = first[0];
+    g.load_change = Vec3(first[1], second[0], second[1]);
+  }
   g.walls = static_cast<int>(row[9] & UINT32_MAX);
   g.held = row[9] >> 32 != 0;
   return g;

@@ -217,8 +217,8 @@ const Refusal refusals[] = {
     {"motion", "keyword 'motion' ends too early: give 'rigid' or 'fixed'"},
     {"walls open", "keyword 'walls' has the value 'open': give 'closed' or 'surface'"},
     {"walls", "keyword 'walls' ends too early: give 'closed' or 'surface'"},
-    {"store compact", "keyword 'store' has the value 'compact': give 'exact'"},
-    {"store", "keyword 'store' ends too early: give 'exact'"},
+    {"store none", "keyword 'store' has the value 'none': give 'exact' or 'compact'"},
+    {"store", "keyword 'store' ends too early: give 'exact' or 'compact'"},
     {"restore refill", "keyword 'restore' has the value 'refill': give 'exact'"},
     {"restore", "keyword 'restore' ends too early: give 'exact'"},
 
