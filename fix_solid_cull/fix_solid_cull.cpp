@@ -293,11 +293,13 @@ void FixSolidCull::init() {
   walls_.connect();
   mesh_loads_.connect();
   const std::vector<bool> flips = histories_.flips();
-  if (contacts_.size() > 0 && flips != contacts_.layout())
+  const bool some = contacts_.size() > 0 || (compact() && store_ && store_->size() > 0);
+  if (some && flips != contacts_.layout())
     refuse("the contact model's history has changed from " + std::to_string(contacts_.width()) + " to " +
            std::to_string(flips.size()) + " numbers while granules are culled: unfix " + id + " before the pair_style changes");
   contacts_.set_layout(flips);
   contacts_.set_vectors(histories_.vectors());
+  packed_.set_layout(contacts_.width(), contacts_.vectors());
   find_movable();
   halo_.update();
   bodies_.set_periods(

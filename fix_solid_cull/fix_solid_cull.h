@@ -23,6 +23,7 @@
 #include "interface_mesh_source.h"
 #include "ledger.h"
 #include "mesh_loads.h"
+#include "packed_history.h"
 #include "pair_force.h"
 #include "settings.h"
 #include "shell_entry.h"
@@ -263,6 +264,9 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void clear_map();
   int bring_back(std::int64_t tag);
   void put_away(int i);
+  Vec3 apart(const Resident& a, const Resident& b) const;
+  bool inner_history(const Resident& g, std::int64_t partner, double* history) const;
+  void turn_inner_histories(int body, const Eigen::Matrix3d& by);
   void entered_store(std::int64_t tag);
   void leaves_store(std::int64_t tag);
   void make_store();
@@ -324,6 +328,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::vector<ShellEntry> shell_;  // by atom index
   std::unique_ptr<GranuleStore> store_;
   FrozenContacts contacts_;
+  PackedHistory packed_;  // of contacts in a compact store: in the tail of the granule that went in later
   SolidBodies bodies_;
   FrozenWallLoads wall_loads_;  // of stored granules
   struct Sum {

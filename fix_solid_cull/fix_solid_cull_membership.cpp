@@ -307,17 +307,87 @@ void FixSolidCull::make_store() {
 
 std::size_t FixSolidCull::locked_here() const { return bodies_.locked() + (compact() ? store_->size() : 0); }
 
-/// A compact store says itself which body a granule is in, and what it touches there.
+/// From a to the image of b that it touches, in the frame of their body.
+Vec3 FixSolidCull::apart(const Resident& a, const Resident& b) const {
+  const Vec3 there = b.position - a.position;
+  if ((bodies_.periods().array() == 0).all()) return there;
+  const Pose& pose = bodies_.pose(a.body);
+  return pose.turned_to_frame(nearest_image(pose.turned_to_world(there), Vec3::Zero()));
+}
+
+/// That of a contact inside a compact store, as g sees it; false if it has none.
+bool FixSolidCull::inner_history(const Resident& g, std::int64_t partner, double* history) const {
+  const Resident other = *store_->find(partner);
+  std::vector<std::uint64_t> tail;
+  store_->tail(g.tag, tail);
+  std::size_t at = packed_.find(tail, partner);
+  if (at < tail.size()) {
+    packed_.unpack(&tail[at], apart(g, other), history);
+    return true;
+  }
+  store_->tail(partner, tail);
+  at = packed_.find(tail, g.tag);
+  if (at == tail.size()) return false;
+  packed_.unpack(&tail[at], apart(other, g), history);
+  contacts_.change_side(history);
+  return true;
+}
+
+void FixSolidCull::turn_inner_histories(int body, const Eigen::Matrix3d& by) {
+  std::vector<Resident> granules;
+  store_->for_each_of_body(body, [&](const Resident& g) { granules.push_back(g); });
+  std::vector<double> history(contacts_.width());
+  std::vector<std::uint64_t> tail, turned;
+  for (const Resident& g : granules) {
+    store_->tail(g.tag, tail);
+    if (tail.empty()) continue;
+    turned.clear();
+    contacts_.for_each_elsewhere(g.tag, [&](std::int64_t partner) {
+      const std::size_t at = packed_.find(tail, partner);
+      if (at == tail.size()) return;
+      const Vec3 normal = apart(g, *store_->find(partner));
+      packed_.unpack(&tail[at], normal, history.data());
+      contacts_.turn(history.data(), by);
+      packed_.pack(partner, history.data(), by * normal, turned);
+    });
+    store_->set_tail(g.tag, turned);
+  }
+}
+
+/// A compact store says itself which body a granule is in, and what it touches there; of the histories of those contacts few bits
+/// are kept.
 void FixSolidCull::entered_store(std::int64_t tag) {
   if (!compact()) return;
+  const Resident g = *store_->find(tag);
+  std::vector<std::int64_t> partners;
+  contacts_.for_each_partner(tag, [&](std::int64_t partner) { partners.push_back(partner); });
+  std::vector<std::uint64_t> tail;
+  contacts_.for_each(tag, [&](std::int64_t partner, const double* history) {
+    if (!history || contacts_.width() == 0 || !store_->contains(partner)) return;
+    if (std::any_of(partners.begin(), partners.end(),
+                    [&](std::int64_t p) { return p != partner && PackedHistory::alike(p, partner); }))
+      return;
+    packed_.pack(partner, history, apart(g, *store_->find(partner)), tail);
+  });
+  if (!tail.empty()) store_->set_tail(tag, tail);
   contacts_.drop(tag, [&](std::int64_t partner) { return store_->contains(partner); });
   bodies_.leave(tag);
 }
 
 void FixSolidCull::leaves_store(std::int64_t tag) {
   if (!compact()) return;
-  contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { contacts_.add(tag, partner, nullptr); });
-  bodies_.take_in(tag, store_->body_of(tag));
+  const Resident g = *store_->find(tag);
+  std::vector<double> history(contacts_.width());
+  std::vector<std::uint64_t> tail;
+  contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) {
+    contacts_.add(tag, partner, inner_history(g, partner, history.data()) ? history.data() : nullptr);
+    store_->tail(partner, tail);
+    const auto at = tail.begin() + static_cast<std::ptrdiff_t>(packed_.find(tail, tag));
+    if (at == tail.end()) return;
+    tail.erase(at, at + static_cast<std::ptrdiff_t>(packed_.words()));
+    store_->set_tail(partner, tail);
+  });
+  bodies_.take_in(tag, g.body);
 }
 
 int FixSolidCull::bring_back(std::int64_t tag) {
@@ -385,6 +455,7 @@ void FixSolidCull::put_away(int i) {
   g.held = e.held;
   if (compact()) {
     g = GranuleStore::rounded(g);
+    if (settings_.tolerance_relative == 0) g.normal_load = 0;  // nothing asks for it
     g.lock_step = e.lock_step == update->ntimestep ? locked_as_it_was_stored : locked_long_ago;
   }
   if (e.walls > 0) wall_loads_.add(g.tag, g.body, mesh_loads_.of(g.tag));

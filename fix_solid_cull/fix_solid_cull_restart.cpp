@@ -120,9 +120,13 @@ std::vector<double> FixSolidCull::serialise(const std::vector<std::int64_t>& sto
   contacts_.for_each_contact([&](std::int64_t low, std::int64_t high, const double* history) {
     if (all || named.contains(low) || named.contains(high)) edge(low, high, history);
   });
+  std::vector<double> inner(contacts_.width());
   for (const std::int64_t tag : stored)
     contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) {
-      if (partner > tag || !named.contains(partner)) edge(std::min(tag, partner), std::max(tag, partner), nullptr);
+      if (partner < tag && named.contains(partner)) return;
+      const std::int64_t low = std::min(tag, partner);
+      const bool known = inner_history(*store_->find(low), std::max(tag, partner), inner.data());
+      edge(low, std::max(tag, partner), known ? inner.data() : nullptr);
     });
   const auto part = [&](double n, Writer& from) {
     w.number(n);
@@ -257,9 +261,7 @@ void FixSolidCull::take_up_as_it_was(const Block& b) {
       e.load_change = pose.turned_to_frame(e.load_change);
     }
   }
-  for (const Block::Edge& e : b.edges)
-    if (!compact() || !store_->contains(e.low) || !store_->contains(e.high))
-      contacts_.add(e.low, e.high, e.history.empty() ? nullptr : e.history.data());
+  for (const Block::Edge& e : b.edges) contacts_.add(e.low, e.high, e.history.empty() ? nullptr : e.history.data());
   for (const auto& [tag, g] : b.granules)
     if (g.record) entered_store(tag);
   group_bodies();
@@ -314,7 +316,6 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
       s.body = at.body;
       s.load_change = to.pose.turned_to_frame(from.pose.turned_to_world(s.load_change));
       store_->add(s, t.granule->record, t.granule->length);
-      entered_store(tag);
       if (sleeping()) change_of_stored(s, +1);
       ledger_.stored(s);
     } else if (i && shell_[*i].body == 0) {
@@ -328,6 +329,8 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
   }
   adopt_places();
   freeze_histories();
+  for (const auto& [tag, t] : taken)
+    if (t.granule->record) entered_store(tag);
   settle_bodies();
 }
 

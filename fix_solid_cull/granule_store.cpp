@@ -25,7 +25,8 @@ std::uint64_t pair_of(int low, int high) {
   return static_cast<std::uint64_t>(static_cast<std::uint32_t>(high)) << 32 | static_cast<std::uint32_t>(low);
 }
 
-std::uint64_t tag_word(std::int64_t tag) { return bits_of(static_cast<double>(tag)); }
+/// As the engine packs it.
+std::uint64_t tag_word(std::int64_t tag) { return static_cast<std::uint64_t>(tag); }
 
 /// Two floats in one word.
 std::uint64_t word_of(double low, double high) {
@@ -52,7 +53,7 @@ StoredGranule GranuleStore::rounded(StoredGranule granule) {
   return granule;
 }
 
-auto GranuleStore::head_of_row(const StoredGranule& g) const -> Head {
+auto GranuleStore::head_of_row(const StoredGranule& g, std::size_t tail) const -> Head {
   Head head{tag_word(g.tag), bits_of(g.radius), bits_of(g.mass), pair_of(g.type, g.layout),
             static_cast<std::uint64_t>(g.lock_step)};
   if (loads_ == Loads::exact) {
@@ -62,7 +63,7 @@ auto GranuleStore::head_of_row(const StoredGranule& g) const -> Head {
     head[5] = word_of(g.normal_load, g.load_change[0]);
     head[6] = word_of(g.load_change[1], g.load_change[2]);
   }
-  head[9] = pair_of(g.walls, g.held);
+  head[9] = pair_of(g.walls, static_cast<int>(tail << 1) | g.held);
   return head;
 }
 
@@ -81,7 +82,7 @@ void GranuleStore::add(const StoredGranule& granule, const double* record, int l
   else
     first_free_ = slots_[s].next;
 
-  const auto head = head_of_row(granule);
+  const auto head = head_of_row(granule, 0);
   std::vector<std::uint64_t>& row = scratch_;
   row.resize(record_begin + static_cast<std::size_t>(length));
   std::copy(head.begin(), head.end(), row.begin());
@@ -153,16 +154,21 @@ StoredGranule GranuleStore::granule(int s) const {
     g.load_change = Vec3(first[1], second[0], second[1]);
   }
   g.walls = static_cast<int>(row[9] & UINT32_MAX);
-  g.held = row[9] >> 32 != 0;
+  g.held = row[9] >> 32 & 1;
   return g;
 }
 
-void GranuleStore::read_record(int s, std::vector<double>& out) const {
+std::vector<std::uint64_t> GranuleStore::row_of(int s) const {
   const int length = rows_.length(slots_[s].row);
   std::vector<std::uint64_t> row(static_cast<std::size_t>(length));
   row[0] = tag_word(slots_[s].tag);
   rows_.get(slots_[s].row, row.data(), length);
-  out.resize(row.size() - record_begin);
+  return row;
+}
+
+void GranuleStore::read_record(int s, std::vector<double>& out) const {
+  const std::vector<std::uint64_t> row = row_of(s);
+  out.resize(row.size() - record_begin - tail_of(row));
   if (!out.empty()) std::memcpy(out.data(), row.data() + record_begin, out.size() * sizeof(double));
   if (const auto* known = transient_.of_tag.find(slots_[s].tag)) {
     std::size_t word = known->first;
@@ -172,14 +178,11 @@ void GranuleStore::read_record(int s, std::vector<double>& out) const {
 
 /// Keeps what has changed but for place and body.
 void GranuleStore::change(int s, const StoredGranule& before, const StoredGranule& after) {
-  const auto head = head_of_row(after);
-  if (head == head_of_row(before)) return;
-  const PackedRows::Place old = slots_[s].row;
-  std::vector<std::uint64_t> row(static_cast<std::size_t>(rows_.length(old)));
-  row[0] = head[0];
-  rows_.get(old, row.data(), static_cast<int>(row.size()));
+  if (head_of_row(after, 0) == head_of_row(before, 0)) return;
+  std::vector<std::uint64_t> row = row_of(s);
+  const auto head = head_of_row(after, tail_of(row));
   std::copy(head.begin() + 1, head.end(), row.begin() + 1);
-  rows_.drop(old);
+  rows_.drop(slots_[s].row);
   slots_[s].row = rows_.put(row.data(), static_cast<int>(row.size()));
   mass_ -= before.mass;
   mass_ += after.mass;
@@ -194,6 +197,22 @@ std::optional<Resident> GranuleStore::find(std::int64_t tag) const {
 StoredGranule GranuleStore::get(std::int64_t tag) const { return granule(slot_or_throw(tag)); }
 
 void GranuleStore::record(std::int64_t tag, std::vector<double>& out) const { read_record(slot_or_throw(tag), out); }
+
+void GranuleStore::tail(std::int64_t tag, std::vector<std::uint64_t>& out) const {
+  const std::vector<std::uint64_t> row = row_of(slot_or_throw(tag));
+  out.assign(row.end() - static_cast<std::ptrdiff_t>(tail_of(row)), row.end());
+}
+
+void GranuleStore::set_tail(std::int64_t tag, const std::vector<std::uint64_t>& tail) {
+  const int s = slot_or_throw(tag);
+  std::vector<std::uint64_t> row = row_of(s);
+  row.resize(row.size() - tail_of(row));
+  row.insert(row.end(), tail.begin(), tail.end());
+  std::uint64_t& last = row[record_begin - 1];
+  last = (last & ((std::uint64_t{1} << 33) - 1)) | static_cast<std::uint64_t>(tail.size()) << 33;
+  rows_.drop(slots_[s].row);
+  slots_[s].row = rows_.put(row.data(), static_cast<int>(row.size()));
+}
 
 bool GranuleStore::transient_known(std::int64_t tag) const { return transient_.of_tag.contains(narrow_tag(tag)); }
 

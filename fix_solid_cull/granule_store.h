@@ -43,8 +43,8 @@ struct Resident {
 
 /// Granules with their engine records (opaque doubles), found by tag in O(1) and by place in O(neighbours). Each body has a grid
 /// of search cells in its own frame, so that a body that moves costs nothing here; bodies that stand still in the world share
-/// one grid, frame 0, so that many small ones cost no more than a large one. Some 90 bytes per granule of a few kinds, 62 to 70
-/// with rounded loads. Local to the rank.
+/// one grid, frame 0, so that many small ones cost no more than a large one. Some 85 bytes per granule of a few kinds, 55 to
+/// 70 with rounded loads. Local to the rank.
 class GranuleStore {
  public:
   static constexpr int shared_frame = 0;  ///< that of all bodies that share(); any other frame has the number of its body
@@ -70,6 +70,9 @@ class GranuleStore {
   }
   StoredGranule get(std::int64_t tag) const;                      ///< std::logic_error if it is not there
   void record(std::int64_t tag, std::vector<double>& out) const;  ///< likewise
+  /// Some words more, none at first; they go with it and are lost when it is taken out. Likewise.
+  void tail(std::int64_t tag, std::vector<std::uint64_t>& out) const;
+  void set_tail(std::int64_t tag, const std::vector<std::uint64_t>& tail);
   bool transient_known(std::int64_t tag) const;                   ///< it has transient words that are not forgotten yet
   void forget_transient() { transient_ = Transient(); }           ///< costs what was added since the last call
 
@@ -159,7 +162,8 @@ class GranuleStore {
  private:
   static constexpr int none = -1;
   static constexpr std::int32_t free_mark = INT32_MIN;
-  /// A granule's row: what head_of_row() says, then its engine record. Tag, radius and mass come first, as key words.
+  /// A granule's row: what head_of_row() says, then its engine record, then its tail. Tag, radius and mass come first, as key
+  /// words.
   static constexpr int record_begin = 10;
   using Head = std::array<std::uint64_t, record_begin>;
   struct Slot {
@@ -262,7 +266,9 @@ class GranuleStore {
   }
   void set_position(int s, const Vec3& p) { std::memcpy(slots_[s].place.data(), p.data(), sizeof(Slot::place)); }
   Resident resident(int s) const;
-  Head head_of_row(const StoredGranule& g) const;
+  Head head_of_row(const StoredGranule& g, std::size_t tail) const;
+  std::vector<std::uint64_t> row_of(int s) const;
+  static std::size_t tail_of(const std::vector<std::uint64_t>& row) { return row[record_begin - 1] >> 33; }
   StoredGranule granule(int s) const;
   void read_record(int s, std::vector<double>& out) const;
   void change(int s, const StoredGranule& before, const StoredGranule& after);

@@ -1,4 +1,4 @@
-// `store compact`: everything of a culled granule comes back but the histories of its contacts with others in the store.
+// `store compact`: of a culled granule all comes back, but of the histories of its contacts with others in the store few bits.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -47,7 +47,7 @@ void expect_same_granules(const State& a, const State& b) {
 
 class Compact : public testing::TestWithParam<Bed> {};
 
-TEST_P(Compact, CullAndRestoreKeepsAllButHistories) {
+TEST_P(Compact, CullAndRestoreKeepsAllButBitsOfHistories) {
   const Bed& b = GetParam();
   const std::string looks = "run 100\nrun 0\n";  // the last look chooses, the next run's setup culls
   Engine never, culled;
@@ -69,41 +69,49 @@ TEST_P(Compact, CullAndRestoreKeepsAllButHistories) {
     EXPECT_LE(largest_difference(never.state(), culled.state(), &Granule::f), 1e-12 * contact_force);
   }
   const Histories ha = never.histories(), hb = culled.histories();
-  double scale = 0;
-  for (const auto& h : ha)
-    for (const double x : h.second) scale = std::max(scale, std::abs(x));
-  std::size_t whole = 0, begun = 0;
+  EXPECT_EQ(ha.size(), hb.size());
+  double off = 0, scale = 0;
+  std::size_t whole = 0, rounded = 0, lost = 0;
+  const auto size = [](const std::vector<double>& h, std::size_t first) {
+    return std::hypot(h[first], h[first + 1], h[first + 2]);
+  };
+  for (const auto& h : ha) scale = std::max(scale, size(h.second, 0));
   for (const auto& h : ha) {
     const auto other = hb.find(h.first);
     ASSERT_NE(other, hb.end()) << h.first.first << " and " << h.first.second << " touch no more";
-    bool none = true, same = true;
-    for (std::size_t d = 0; d < h.second.size(); ++d) {
-      none = none && other->second[d] == 0;
-      same = same && std::abs(other->second[d] - h.second[d]) <= 1e-12 * scale;
+    bool same = true, none = true;
+    double worst = 0;
+    for (std::size_t v = 0; v + 2 < h.second.size(); v += 3) {  // shear, rolling torque
+      std::vector<double> difference;
+      for (std::size_t d = v; d < v + 3; ++d) difference.push_back(other->second[d] - h.second[d]);
+      none = none && size(other->second, v) == 0;
+      same = same && size(difference, 0) <= 1e-12 * scale;
+      if (size(h.second, v) > 0) worst = std::max(worst, size(difference, 0) / size(h.second, v));
     }
-    if (same)
-      ++whole;
-    else if (none)
-      ++begun;
-    else
-      ADD_FAILURE() << h.first.first << " and " << h.first.second
-                    << " have a history that is neither theirs nor none: " << h.second[0] << " became " << other->second[0];
+    whole += same;
+    lost += none && !same;
+    rounded += !none && !same;
+    if (!none && !same) off = std::max(off, worst);
   }
+  EXPECT_LE(off, 0.05) << "1 % in the plane of contact; what the engine has left across it is not kept";
+  EXPECT_LE(lost, 2 + ha.size() / 1000) << "two partners with one key";
   for (int k = 0; k <= 4; ++k) {
     const State a = never.state(), c = culled.state();
     if (never.rank() == 0)
       std::printf(
-          "%s: %g interior, %zu histories whole, %zu begun anew; after %d steps dx/d %.3g, kinetic %.3g and %.3g J, height %+.3g "
-          "J\n",
-          b.name.c_str(), interior, whole, begun, 250 * k, largest_difference(a, c, &Granule::x) / diameter, energy_of_motion(a),
-          energy_of_motion(c), energy_of_height(c) - energy_of_height(a));
+          "%s: %g interior, histories: %zu whole, %zu off by up to %.2g, %zu lost; after %d steps dx/d %.3g, kinetic %.3g and "
+          "%.3g J, "
+          "height %+.3g J\n",
+          b.name.c_str(), interior, whole, rounded, off, lost, 250 * k, largest_difference(a, c, &Granule::x) / diameter,
+          energy_of_motion(a), energy_of_motion(c), energy_of_height(c) - energy_of_height(a));
     if (k < 4) {
       never.run("run 250\n");
       culled.run("run 250\n");
     }
   }
-  EXPECT_LE(energy_of_height(culled.state()), energy_of_height(never.state()) + energy_of_motion(never.state()))
-      << "a restore adds no energy";
+  const double apart = largest_difference(never.state(), culled.state(), &Granule::x);
+  EXPECT_LE(apart, 1e-4 * diameter) << "contacts bear what they bore";
+  EXPECT_LE(energy_of_motion(culled.state()), energy_of_motion(never.state()) * 1.1 + 1e-13);
 }
 
 Bed periodic() {

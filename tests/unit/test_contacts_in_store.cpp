@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <map>
 #include <random>
 #include <set>
 
 #include "contacts_in_store.h"
+#include "packed_history.h"
 #include "solid_state.h"
 
 namespace solidcull {
@@ -67,7 +69,9 @@ struct Packing {
       for (const std::int64_t partner : around(g.first)) contacts.add(g.first, partner, history.data());
   }
   void put_away(std::int64_t tag) {
-    const std::vector<double> record = {0, 0, 0, double(tag), granules.at(tag).radius, 2500, granules.at(tag).mass, 1, 1};
+    double tag_word;  // as the engine packs its ints
+    std::memcpy(&tag_word, &tag, sizeof tag);
+    const std::vector<double> record = {0, 0, 0, tag_word, granules.at(tag).radius, 2500, granules.at(tag).mass, 1, 1};
     store.add(granules.at(tag), record.data(), static_cast<int>(record.size()));
     contacts.drop(tag, [&](std::int64_t partner) { return store.contains(partner); });
     bodies.leave(tag);
@@ -239,8 +243,10 @@ TEST(ContactsInStore, a_body_comes_apart_where_what_was_stored_goes) {
 }
 
 TEST(ContactsInStore, a_granule_of_a_few_kinds_takes_no_more_than_79_bytes_in_all) {
-  // 27,000, locked and tied all at once, of two sizes; each has its own load, every tenth its own change of it
+  // 27,000, locked and tied all at once, of two sizes, with 2.2 histories each; every tenth has its own change of load
   Packing p(2.0);
+  PackedHistory packed;
+  packed.set_layout(6, {0, 3});
   p.bodies.found(SolidBody());
   std::mt19937 random(4);
   std::uniform_real_distribution<double> load(0, 1);
@@ -248,7 +254,6 @@ TEST(ContactsInStore, a_granule_of_a_few_kinds_takes_no_more_than_79_bytes_in_al
   const double spacing = std::cbrt(0.5236 / 0.6);
   for (int k = 0; k < n * n * n; ++k) {
     StoredGranule g = granule(k + 1, 1, spacing * Vec3(k / (n * n), k / n % n, k % n), k % 2 ? 0.5 : 0.48);
-    g.normal_load = load(random);
     if (k % 10 == 0) g.load_change = Vec3(load(random), load(random), load(random));
     p.lock(g);
   }
@@ -257,7 +262,15 @@ TEST(ContactsInStore, a_granule_of_a_few_kinds_takes_no_more_than_79_bytes_in_al
     for (const int step : {1, n, n * n})
       if (k + step < n * n * n) p.contacts.add(k + 1, k + 1 + step, history.data());
   const double before = static_cast<double>(p.contacts.memory_bytes() + p.bodies.member_bytes()) / (n * n * n);
-  for (int tag = 1; tag <= n * n * n; ++tag) p.put_away(tag);
+  for (int tag = 1; tag <= n * n * n; ++tag) {
+    p.put_away(tag);
+    std::vector<std::uint64_t> tail;
+    for (int k = 0; k < 2 + (tag % 5 == 0); ++k) {
+      const double own[6] = {0, load(random), load(random), 0, load(random), load(random)};
+      packed.pack(tag + k, own, Vec3(1, 0, 0), tail);
+    }
+    p.store.set_tail(tag, tail);
+  }
   p.contacts.fit();
   p.bodies.fit();
   const double store = p.store.bytes_per_granule(), contacts = static_cast<double>(p.contacts.memory_bytes()) / (n * n * n),
