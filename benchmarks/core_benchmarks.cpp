@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <random>
 #include <vector>
 
@@ -45,7 +46,7 @@ struct Lattice {
     const StoredGranule g = granule(tag);
     std::vector<double> record(28, 1.0);
     record[0] = g.position[0];
-    record[6] = static_cast<double>(tag);
+    std::memcpy(&record[6], &tag, sizeof tag);  // as the engine packs its ints
     record[10] = g.radius;
     record[12] = g.mass;
     store.add(g, record.data(), static_cast<int>(record.size()), transient);

@@ -6,12 +6,12 @@
 
 namespace solidcull {
 
-/// Rows of `width` elements each, numbered from 0, in chunks of one size (about 32 kB). A row lies in one piece and stays where
-/// it is until clear(). T is a plain type.
+/// Rows of `width` elements each, numbered from 0, in chunks of one size (at most 32 kB, or as given). A row lies in one piece
+/// and stays where it is until clear(). T is a plain type.
 template <class T>
 class ChunkedArray {
  public:
-  explicit ChunkedArray(std::size_t width = 1) : width_(width) {
+  explicit ChunkedArray(std::size_t width = 1, std::size_t chunk_bytes = 32768) : width_(width) {
     while (shift_ > 0 && (width << shift_) * sizeof(T) > chunk_bytes) --shift_;
   }
 
@@ -35,7 +35,6 @@ class ChunkedArray {
   }
 
  private:
-  static constexpr std::size_t chunk_bytes = 32768;
   std::size_t mask() const { return (std::size_t{1} << shift_) - 1; }
 
   std::size_t width_, size_ = 0;

@@ -241,7 +241,7 @@ void FixSolidCull::find_scales() {
                   settings_.calm};
   wake_up_ = {settings_.tolerance_absolute, settings_.tolerance_relative, weight_scale_, settings_.carve_radius * d,
               settings_.carve_cap};
-  if (!store_) store_ = std::make_unique<GranuleStore>(2 * d);
+  if (!store_) make_store();
   if (!surface_)
     surface_ = std::make_unique<ImplicitSurface>(
         settings_.voxel * d, closing(), [this](const Vec3& lo, const Vec3& hi, const std::function<void(const Sphere&)>& visit) {
@@ -293,11 +293,13 @@ void FixSolidCull::init() {
   walls_.connect();
   mesh_loads_.connect();
   const std::vector<bool> flips = histories_.flips();
-  if (contacts_.size() > 0 && flips != contacts_.layout())
+  const bool some = contacts_.size() > 0 || (compact() && store_ && store_->size() > 0);
+  if (some && flips != contacts_.layout())
     refuse("the contact model's history has changed from " + std::to_string(contacts_.width()) + " to " +
            std::to_string(flips.size()) + " numbers while granules are culled: unfix " + id + " before the pair_style changes");
   contacts_.set_layout(flips);
   contacts_.set_vectors(histories_.vectors());
+  packed_.set_layout(contacts_.width(), contacts_.vectors());
   find_movable();
   halo_.update();
   bodies_.set_periods(
@@ -415,8 +417,8 @@ void FixSolidCull::check_invariants() {
   // every locked granule is a member of a body, and nothing else is
   std::size_t locked = store_->size();
   for (int i = 0; i < atom->nlocal; ++i) locked += shell_[i].locked;
-  if (locked != bodies_.locked())
-    broken(std::to_string(bodies_.locked()) + " granules are in bodies and " + std::to_string(locked) + " are locked");
+  if (locked != locked_here())
+    broken(std::to_string(locked_here()) + " granules are in bodies and " + std::to_string(locked) + " are locked");
   // and each body has the count, mass and first moment of its granules
   std::map<int, MassProperties> sums;
   for (int i = 0; i < atom->nlocal; ++i) {
@@ -612,7 +614,7 @@ void FixSolidCull::sum_carried() {
 }
 
 double FixSolidCull::memory_usage() {
-  double bytes = static_cast<double>(shell_.capacity() * sizeof(ShellEntry) + contacts_.memory_bytes());
+  double bytes = static_cast<double>(shell_.capacity() * sizeof(ShellEntry) + contacts_.memory_bytes() + bodies_.member_bytes());
   if (store_) bytes += static_cast<double>(store_->memory_bytes());
   return bytes;
 }

@@ -23,6 +23,7 @@
 #include "interface_mesh_source.h"
 #include "ledger.h"
 #include "mesh_loads.h"
+#include "packed_history.h"
 #include "pair_force.h"
 #include "settings.h"
 #include "shell_entry.h"
@@ -112,6 +113,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
 
   bool rigid() const { return settings_.motion == Motion::rigid; }
   bool sleeping() const { return settings_.exterior == Exterior::sleep; }
+  bool compact() const { return settings_.store == Store::compact; }
   bool needs_surface() const { return settings_.exterior == Exterior::live; }
 
   // --- fix_solid_cull_bodies.cpp: how solid bodies move -------------------------------------------------------------------
@@ -262,6 +264,13 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void clear_map();
   int bring_back(std::int64_t tag);
   void put_away(int i);
+  Vec3 apart(const Resident& a, const Resident& b) const;
+  bool inner_history(const Resident& g, std::int64_t partner, double* history) const;
+  void turn_inner_histories(int body, const Eigen::Matrix3d& by);
+  void entered_store(std::int64_t tag);
+  void leaves_store(std::int64_t tag);
+  void make_store();
+  std::size_t locked_here() const;
   void change_of_stored(const StoredGranule& g, int sign);
   bool may_leave_its_walls(const ShellEntry& e) const;
   void restore_all();
@@ -319,6 +328,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::vector<ShellEntry> shell_;  // by atom index
   std::unique_ptr<GranuleStore> store_;
   FrozenContacts contacts_;
+  PackedHistory packed_;  // of contacts in a compact store: in the tail of the granule that went in later
   SolidBodies bodies_;
   FrozenWallLoads wall_loads_;  // of stored granules
   struct Sum {
@@ -418,6 +428,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::vector<std::size_t> riding_;  // those of them whose bodies move
   bool locked_index_stale_ = true;
   std::vector<int> motion_words_;  // of a record: what is of no worth once a step has passed
+  // lock_step in a compact store, which needs to know no more
+  static constexpr std::int64_t locked_long_ago = -1, locked_as_it_was_stored = -2;
   std::int64_t stored_at_ = -1;    // step in which granules last went into the store
   bool lists_are_new_ = false;
   bool map_cleared_ = false;

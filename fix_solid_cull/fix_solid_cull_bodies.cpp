@@ -390,6 +390,7 @@ void FixSolidCull::adopt_places() {
     const Pose &from = gone.second, &to = bodies_.pose(body);
     const bool same = from == to;
     const Eigen::Matrix3d turn = to.turn().transpose() * from.turn();
+    if (compact() && !same) turn_inner_histories(gone.first, turn);
     store_->merge(gone.first, body, [&](StoredGranule& g) {
       if (same) return;
       g.position = to.to_frame(from.to_world(g.position));

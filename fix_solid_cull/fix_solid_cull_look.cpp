@@ -89,7 +89,7 @@ void FixSolidCull::look() {
 
 void FixSolidCull::pause_where_bodies_wake() {
   // a scene that is shaken wakes most of what is culled again and again: culling waits, longer each time, until it stops
-  std::int64_t counts[2] = {0, static_cast<std::int64_t>(bodies_.locked())};
+  std::int64_t counts[2] = {0, static_cast<std::int64_t>(locked_here())};
   for (const auto& b : bodies_.bodies())
     if (waking_bodies_.count(key_of(b.first))) counts[0] += b.second.mass.count;
   MPI_Allreduce(MPI_IN_PLACE, counts, 2, MPI_INT64_T, MPI_SUM, world);

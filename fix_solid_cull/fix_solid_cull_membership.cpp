@@ -9,6 +9,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "contacts_in_store.h"
 #include "domain.h"
 #include "engine_access.h"
 #include "engine_vectors.h"
@@ -177,6 +178,10 @@ void FixSolidCull::change_membership() {
   side_changes_.clear();
   touches_.clear();
   joins_.clear();
+  if (compact()) {
+    contacts_.fit();
+    bodies_.fit();
+  }
   if (!new_run_ && memory_.too_large()) fit_memory();  // walls keep pointers into the arrays over the setup of a run
   locked_index_stale_ = true;
   refresh_locked();
@@ -292,8 +297,102 @@ void FixSolidCull::clear_map() {
   map_cleared_ = true;
 }
 
+void FixSolidCull::make_store() {
+  store_ = std::make_unique<GranuleStore>(2 * diameter_, compact() ? GranuleStore::Loads::rounded : GranuleStore::Loads::exact);
+  if (!compact()) return;
+  contacts_.set_elsewhere(
+      [this](std::int64_t tag, std::vector<std::int64_t>& partners) { contacts_in_store(*store_, bodies_, tag, partners); });
+  bodies_.set_elsewhere([this](std::int64_t tag) { return store_->body_of(tag); });
+}
+
+std::size_t FixSolidCull::locked_here() const { return bodies_.locked() + (compact() ? store_->size() : 0); }
+
+/// From a to the image of b that it touches, in the frame of their body.
+Vec3 FixSolidCull::apart(const Resident& a, const Resident& b) const {
+  const Vec3 there = b.position - a.position;
+  if ((bodies_.periods().array() == 0).all()) return there;
+  const Pose& pose = bodies_.pose(a.body);
+  return pose.turned_to_frame(nearest_image(pose.turned_to_world(there), Vec3::Zero()));
+}
+
+/// That of a contact inside a compact store, as g sees it; false if it has none.
+bool FixSolidCull::inner_history(const Resident& g, std::int64_t partner, double* history) const {
+  const Resident other = *store_->find(partner);
+  std::vector<std::uint64_t> tail;
+  store_->tail(g.tag, tail);
+  std::size_t at = packed_.find(tail, partner);
+  if (at < tail.size()) {
+    packed_.unpack(&tail[at], apart(g, other), history);
+    return true;
+  }
+  store_->tail(partner, tail);
+  at = packed_.find(tail, g.tag);
+  if (at == tail.size()) return false;
+  packed_.unpack(&tail[at], apart(other, g), history);
+  contacts_.change_side(history);
+  return true;
+}
+
+void FixSolidCull::turn_inner_histories(int body, const Eigen::Matrix3d& by) {
+  std::vector<Resident> granules;
+  store_->for_each_of_body(body, [&](const Resident& g) { granules.push_back(g); });
+  std::vector<double> history(contacts_.width());
+  std::vector<std::uint64_t> tail, turned;
+  for (const Resident& g : granules) {
+    store_->tail(g.tag, tail);
+    if (tail.empty()) continue;
+    turned.clear();
+    contacts_.for_each_elsewhere(g.tag, [&](std::int64_t partner) {
+      const std::size_t at = packed_.find(tail, partner);
+      if (at == tail.size()) return;
+      const Vec3 normal = apart(g, *store_->find(partner));
+      packed_.unpack(&tail[at], normal, history.data());
+      contacts_.turn(history.data(), by);
+      packed_.pack(partner, history.data(), by * normal, turned);
+    });
+    store_->set_tail(g.tag, turned);
+  }
+}
+
+/// A compact store says itself which body a granule is in, and what it touches there; of the histories of those contacts few bits
+/// are kept.
+void FixSolidCull::entered_store(std::int64_t tag) {
+  if (!compact()) return;
+  const Resident g = *store_->find(tag);
+  std::vector<std::int64_t> partners;
+  contacts_.for_each_partner(tag, [&](std::int64_t partner) { partners.push_back(partner); });
+  std::vector<std::uint64_t> tail;
+  contacts_.for_each(tag, [&](std::int64_t partner, const double* history) {
+    if (!history || contacts_.width() == 0 || !store_->contains(partner)) return;
+    if (std::any_of(partners.begin(), partners.end(),
+                    [&](std::int64_t p) { return p != partner && PackedHistory::alike(p, partner); }))
+      return;
+    packed_.pack(partner, history, apart(g, *store_->find(partner)), tail);
+  });
+  if (!tail.empty()) store_->set_tail(tag, tail);
+  contacts_.drop(tag, [&](std::int64_t partner) { return store_->contains(partner); });
+  bodies_.leave(tag);
+}
+
+void FixSolidCull::leaves_store(std::int64_t tag) {
+  if (!compact()) return;
+  const Resident g = *store_->find(tag);
+  std::vector<double> history(contacts_.width());
+  std::vector<std::uint64_t> tail;
+  contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) {
+    contacts_.add(tag, partner, inner_history(g, partner, history.data()) ? history.data() : nullptr);
+    store_->tail(partner, tail);
+    const auto at = tail.begin() + static_cast<std::ptrdiff_t>(packed_.find(tail, tag));
+    if (at == tail.end()) return;
+    tail.erase(at, at + static_cast<std::ptrdiff_t>(packed_.words()));
+    store_->set_tail(partner, tail);
+  });
+  bodies_.take_in(tag, g.body);
+}
+
 int FixSolidCull::bring_back(std::int64_t tag) {
   clear_map();
+  leaves_store(tag);
   std::vector<double> record;
   const bool still_there = store_->transient_known(tag);  // put away in this very step
   const StoredGranule g = store_->take(tag, record);
@@ -312,12 +411,13 @@ int FixSolidCull::bring_back(std::int64_t tag) {
   e.walls = g.walls;
   e.held = g.held;
   e.came_back = update->ntimestep;
-  e.lock_step = g.lock_step;
+  e.lock_step = g.lock_step == locked_as_it_was_stored && still_there ? update->ntimestep : g.lock_step;
   e.velocity = vec(atom->v[i]);
   e.spin = vec(atom->omega[i]);
   const SolidBody& body = bodies_.body(g.body);
   const Vec3 x = body.pose.to_world(g.position);
-  if (!still_there) set(atom->x[i], nearest_image(x, vec(atom->x[i])));  // else nothing has moved
+  if (!still_there)  // else nothing has moved
+    set(atom->x[i], nearest_image(x, compact() ? Vec3(0.5 * (vec(domain->boxlo) + vec(domain->boxhi))) : vec(atom->x[i])));
   set(atom->v[i], body.twist.at(x));
   set(atom->omega[i], body.twist.spin);
   e.registered = true;  // the implicit surface does not care who holds a granule
@@ -338,6 +438,7 @@ void FixSolidCull::put_away(int i) {
   set(atom->v[i], e.velocity);
   set(atom->omega[i], e.spin);
   histories_.clear(i);
+  if (compact()) domain->remap(atom->x[i], atom->image[i]);  // the box and the place tell which image: no word is kept for it
   std::vector<double> record;
   StoredGranule g;
   records_.pack(i, record, g.layout);
@@ -352,14 +453,20 @@ void FixSolidCull::put_away(int i) {
   g.normal_load = e.normal_load;
   g.walls = e.walls;
   g.held = e.held;
+  if (compact()) {
+    g = GranuleStore::rounded(g);
+    if (settings_.tolerance_relative == 0) g.normal_load = 0;  // nothing asks for it
+    g.lock_step = e.lock_step == update->ntimestep ? locked_as_it_was_stored : locked_long_ago;
+  }
   if (e.walls > 0) wall_loads_.add(g.tag, g.body, mesh_loads_.of(g.tag));
   if (sleeping()) change_of_stored(g, +1);
   if (stored_at_ != update->ntimestep) {
     stored_at_ = update->ntimestep;
     const bool periodic = domain->xperiodic || domain->yperiodic || domain->zperiodic;  // the place tells which image
-    motion_words_ = records_.motion_words(i, !periodic);
+    motion_words_ = records_.motion_words(i, !periodic || compact());
   }
   store_->add(g, record.data(), static_cast<int>(record.size()), motion_words_);
+  entered_store(g.tag);
   ledger_.stored(g);
   double& largest = largest_radius_by_type_[g.type];
   largest = std::max(largest, g.radius);
@@ -432,7 +539,7 @@ void FixSolidCull::tell_neighbours() {
 }
 
 void FixSolidCull::count_bodies() {
-  std::int64_t counts[2] = {static_cast<std::int64_t>(bodies_.size()), static_cast<std::int64_t>(bodies_.locked())};
+  std::int64_t counts[2] = {static_cast<std::int64_t>(bodies_.size()), static_cast<std::int64_t>(locked_here())};
   MPI_Allreduce(MPI_IN_PLACE, counts, 2, MPI_INT64_T, MPI_SUM, world);
   store_bodies_ = static_cast<int>(counts[0]);
   locked_everywhere_ = counts[1];
@@ -617,7 +724,7 @@ void FixSolidCull::forget_lost_atoms() {
   for (int i = 0; i < atom->nlocal; ++i) here += shell_[i].locked;
   FlatMap<char> present;
   std::vector<Locked> lost;
-  if (here != bodies_.locked() - store_->size()) {
+  if (here != locked_here() - store_->size()) {
     for (int i = 0; i < atom->nlocal; ++i) present[atom->tag[i]] = 1;
     for (const Locked& l : locked_before_)
       if (!present.contains(l.tag) && bodies_.body_of(l.tag) && !store_->contains(l.tag)) lost.push_back(l);
@@ -954,7 +1061,7 @@ void FixSolidCull::restore_all() {
   halo_.update();
   wake_all_ = true;
   change_membership();
-  if (store_->size() != 0 || bodies_.locked() != 0 || contacts_.size() != 0)
+  if (store_->size() != 0 || locked_here() != 0 || contacts_.size() != 0)
     broken("a restore of everything left " + std::to_string(store_->size()) + " granules in the store");
 }
 

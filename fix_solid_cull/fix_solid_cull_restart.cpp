@@ -111,13 +111,23 @@ std::vector<double> FixSolidCull::serialise(const std::vector<std::int64_t>& sto
   }
   Writer edges;
   double count = 0;
-  contacts_.for_each_contact([&](std::int64_t low, std::int64_t high, const double* history) {
-    if (!all && !named.contains(low) && !named.contains(high)) return;
+  const auto edge = [&](std::int64_t low, std::int64_t high, const double* history) {
     const int body = bodies_.body_of(low) ? bodies_.body_of(low) : bodies_.body_of(high);
     for (const double x : {double(low), double(high), double(index_of(body)), double(history != nullptr)}) edges.number(x);
     if (history) edges.numbers(history, contacts_.width());
     ++count;
+  };
+  contacts_.for_each_contact([&](std::int64_t low, std::int64_t high, const double* history) {
+    if (all || named.contains(low) || named.contains(high)) edge(low, high, history);
   });
+  std::vector<double> inner(contacts_.width());
+  for (const std::int64_t tag : stored)
+    contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) {
+      if (partner < tag && named.contains(partner)) return;
+      const std::int64_t low = std::min(tag, partner);
+      const bool known = inner_history(*store_->find(low), std::max(tag, partner), inner.data());
+      edge(low, std::max(tag, partner), known ? inner.data() : nullptr);
+    });
   const auto part = [&](double n, Writer& from) {
     w.number(n);
     const std::vector<double> x = from.take();
@@ -189,6 +199,10 @@ std::vector<FixSolidCull::Block> FixSolidCull::parse_blocks(const std::vector<do
         s.walls = static_cast<int>(in.whole());
         s.held = g.held;
         s.load_change = in.vector();
+        if (compact()) {
+          s = GranuleStore::rounded(s);
+          s.lock_step = std::min(s.lock_step, locked_long_ago);
+        }
         g.record = in.numbers(static_cast<std::size_t>(g.length));
       }
       b.granules.emplace(tag, g);
@@ -248,6 +262,8 @@ void FixSolidCull::take_up_as_it_was(const Block& b) {
     }
   }
   for (const Block::Edge& e : b.edges) contacts_.add(e.low, e.high, e.history.empty() ? nullptr : e.history.data());
+  for (const auto& [tag, g] : b.granules)
+    if (g.record) entered_store(tag);
   group_bodies();
 }
 
@@ -313,6 +329,8 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
   }
   adopt_places();
   freeze_histories();
+  for (const auto& [tag, t] : taken)
+    if (t.granule->record) entered_store(tag);
   settle_bodies();
 }
 
@@ -369,7 +387,14 @@ void FixSolidCull::hand_over() {
   // they leave this rank's part of their bodies; contacts with what stays are kept
   std::vector<std::int64_t> leaving = atoms;
   leaving.insert(leaving.end(), stored.begin(), stored.end());
-  for (const std::int64_t tag : leaving) bodies_.unlock(tag, mass_of(tag), contacts_);
+  std::vector<GranuleMass> masses;
+  for (const std::int64_t tag : leaving) masses.push_back(mass_of(tag));
+  std::vector<double> record;
+  for (const std::int64_t tag : stored) {
+    leaves_store(tag);
+    ledger_.returned(store_->take(tag, record));
+  }
+  for (std::size_t k = 0; k < leaving.size(); ++k) bodies_.unlock(leaving[k], masses[k], contacts_);
   for (const std::int64_t tag : atoms) shell_[*index_of_.find(tag)].body = -1;
   for (const std::int64_t tag : leaving) {
     struct Kept {
@@ -384,8 +409,6 @@ void FixSolidCull::hand_over() {
     for (const Kept& c : kept) contacts_.add(c.tag, c.partner, c.history.empty() ? nullptr : c.history.data());
   }
   split_bodies();
-  std::vector<double> record;
-  for (const std::int64_t tag : stored) ledger_.returned(store_->take(tag, record));
   take_up(parse_blocks(blocks, 0, contacts_.width()));
   publish_restored();
 }

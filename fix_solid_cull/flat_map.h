@@ -86,6 +86,11 @@ class FlatMap {
       std::fill(slots_.begin(), slots_.end(), Slot{empty_key, Value{}});
     size_ = 0;
   }
+  /// Gives room back that was needed once: at most twice what its elements need stays.
+  void fit() {
+    const std::size_t due = std::max(smallest, size_ + size_ / 3 + 1);
+    if (slots_.size() > 2 * due) rehash(due);
+  }
   std::size_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
   std::size_t memory_bytes() const { return slots_.capacity() * sizeof(Slot); }

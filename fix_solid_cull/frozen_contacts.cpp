@@ -79,16 +79,30 @@ void FrozenContacts::unlink(std::uint32_t e, std::int64_t tag) {
   set_next(before, tag, after);
 }
 
+void FrozenContacts::remove(std::uint32_t e) {
+  Edge& edge = edges_[e];
+  unlink(e, edge.low);
+  unlink(e, edge.high);
+  edge.high = edge.low;
+  edge.next_low = first_free_;
+  first_free_ = e;
+  --count_;
+}
+
 void FrozenContacts::erase(std::int64_t tag) {
-  for (std::uint32_t e = first(tag); e != none; e = first(tag)) {
-    Edge& edge = edges_[e];
-    unlink(e, edge.low);
-    unlink(e, edge.high);
-    edge.high = edge.low;
-    edge.next_low = first_free_;
-    first_free_ = e;
-    --count_;
-  }
+  for (std::uint32_t e = first(tag); e != none; e = first(tag)) remove(e);
+}
+
+void FrozenContacts::fit() {
+  constexpr std::size_t chunk = 4096;  // edges
+  if (edges_.size() <= 2 * count_ + chunk) return;
+  FrozenContacts fitting;
+  fitting.flips_ = flips_;
+  fitting.vectors_ = vectors_;
+  fitting.elsewhere_ = elsewhere_;
+  fitting.histories_ = ChunkedArray<double>(width());
+  for_each_contact([&](std::int64_t low, std::int64_t high, const double* history) { fitting.add(low, high, history); });
+  *this = std::move(fitting);
 }
 
 std::size_t FrozenContacts::memory_bytes() const {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "chunked_array.h"
@@ -17,12 +18,18 @@ namespace solidcull {
 /// A history has a sense: component d changes its sign with the side it is seen from where flips[d] is true.
 /// Tags are the engine's ints (else std::logic_error). Local to the rank; a contact across ranks stands in the graph of either
 /// rank. Memory: 16 bytes per edge, 8 width() for its history, 13 per node.
+/// Contacts that are known from elsewhere, without history, are listed with a granule's own and stand nowhere else: add(),
+/// contains(), drop(), erase(), for_each_contact() and size() know the graph's own edges only.
 class FrozenContacts {
  public:
   /// flips: one entry per history component, true for vector-like ones (the engine's "newton" flag of that component).
   void set_layout(std::vector<bool> flips);
   const std::vector<bool>& layout() const { return flips_; }
   std::size_t width() const { return flips_.size(); }
+
+  /// Adds to `partners` those of `tag` that are known from elsewhere; they must not stand in the graph too.
+  using Elsewhere = std::function<void(std::int64_t tag, std::vector<std::int64_t>& partners)>;
+  void set_elsewhere(Elsewhere contacts) { elsewhere_ = std::move(contacts); }
 
   /// Adds the contact of `tag` with `partner`, history as `tag` sees it (`width()` numbers, or nullptr: touching without
   /// history). A contact that is there already keeps its place and takes the new history.
@@ -33,11 +40,21 @@ class FrozenContacts {
   void for_each(std::int64_t tag, Visit visit) const {
     Seen seen(width());
     for (std::uint32_t e = first(tag); e != none; e = next(e, tag)) visit(other(e, tag), read(e, tag, seen.data()));
+    if (elsewhere_) for_each_elsewhere(tag, [&](std::int64_t partner) { visit(partner, nullptr); });
   }
   /// Partners only; cheaper.
   template <class Visit>
   void for_each_partner(std::int64_t tag, Visit visit) const {
     for (std::uint32_t e = first(tag); e != none; e = next(e, tag)) visit(other(e, tag));
+    if (elsewhere_) for_each_elsewhere(tag, visit);
+  }
+  /// Those of them that are known from elsewhere.
+  template <class Visit>
+  void for_each_elsewhere(std::int64_t tag, Visit visit) const {
+    if (!elsewhere_) return;
+    std::vector<std::int64_t> partners;
+    elsewhere_(tag, partners);
+    for (const std::int64_t partner : partners) visit(partner);
   }
   /// Every contact once: visit(low tag, high tag, history as the low tag sees it or nullptr).
   template <class Visit>
@@ -79,6 +96,16 @@ class FrozenContacts {
   }
   /// Removes all contacts of `tag`.
   void erase(std::int64_t tag);
+  /// Removes those with partners for which goes(partner) holds.
+  template <class Goes>
+  void drop(std::int64_t tag, Goes goes) {
+    for (std::uint32_t e = first(tag), after; e != none; e = after) {
+      after = next(e, tag);
+      if (goes(other(e, tag))) remove(e);
+    }
+  }
+  /// Gives room back that was needed once: at most twice what its edges need stays, and a chunk.
+  void fit();
   std::size_t size() const { return count_; }
   std::size_t memory_bytes() const;
 
@@ -117,6 +144,7 @@ class FrozenContacts {
   }
   std::uint32_t find(std::int64_t tag, std::int64_t partner) const;
   void unlink(std::uint32_t e, std::int64_t tag);
+  void remove(std::uint32_t e);
   const double* read(std::uint32_t e, std::int64_t tag, double* out) const;
   void write(std::uint32_t e, std::int64_t tag, const double* history);
 
@@ -127,6 +155,7 @@ class FrozenContacts {
   std::uint32_t first_free_ = none;
   FlatMap<std::uint32_t, std::int32_t> heads_;
   std::size_t count_ = 0;
+  Elsewhere elsewhere_;
 };
 
 }  // namespace solidcull

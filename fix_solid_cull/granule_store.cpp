@@ -10,9 +10,6 @@ namespace {
 
 constexpr std::uint32_t empty_entry = UINT32_MAX;
 
-/// A granule's row: what is below, then its engine record. Tag, radius and mass come first, as key words.
-constexpr int record_begin = 10;
-
 std::uint64_t bits_of(double x) {
   std::uint64_t word;
   std::memcpy(&word, &x, sizeof word);
@@ -28,25 +25,46 @@ std::uint64_t pair_of(int low, int high) {
   return static_cast<std::uint64_t>(static_cast<std::uint32_t>(high)) << 32 | static_cast<std::uint32_t>(low);
 }
 
-std::uint64_t tag_word(std::int64_t tag) { return bits_of(static_cast<double>(tag)); }
+/// As the engine packs it.
+std::uint64_t tag_word(std::int64_t tag) { return static_cast<std::uint64_t>(tag); }
 
-std::array<std::uint64_t, record_begin> head_of_row(const StoredGranule& g) {
-  return {tag_word(g.tag),
-          bits_of(g.radius),
-          bits_of(g.mass),
-          pair_of(g.type, g.layout),
-          static_cast<std::uint64_t>(g.lock_step),
-          bits_of(g.normal_load),
-          bits_of(g.load_change[0]),
-          bits_of(g.load_change[1]),
-          bits_of(g.load_change[2]),
-          pair_of(g.walls, g.held)};
+/// Two floats in one word.
+std::uint64_t word_of(double low, double high) {
+  const float pair[] = {static_cast<float>(low), static_cast<float>(high)};
+  std::uint64_t word;
+  std::memcpy(&word, pair, sizeof word);
+  return word;
+}
+std::array<double, 2> floats_of(std::uint64_t word) {
+  float pair[2];
+  std::memcpy(pair, &word, sizeof word);
+  return {pair[0], pair[1]};
 }
 
 }  // namespace
 
-GranuleStore::GranuleStore(double cell) : inverse_cell_(1.0 / cell) {
+GranuleStore::GranuleStore(double cell, Loads loads) : inverse_cell_(1.0 / cell), loads_(loads) {
   if (!(cell > 0) || !std::isfinite(cell)) throw std::invalid_argument("granule store: the cell size must be positive");
+}
+
+StoredGranule GranuleStore::rounded(StoredGranule granule) {
+  granule.normal_load = static_cast<float>(granule.normal_load);
+  granule.load_change = granule.load_change.cast<float>().cast<double>();
+  return granule;
+}
+
+auto GranuleStore::head_of_row(const StoredGranule& g, std::size_t tail) const -> Head {
+  Head head{tag_word(g.tag), bits_of(g.radius), bits_of(g.mass), pair_of(g.type, g.layout),
+            static_cast<std::uint64_t>(g.lock_step)};
+  if (loads_ == Loads::exact) {
+    head[5] = bits_of(g.normal_load);
+    for (int d = 0; d < 3; ++d) head[6 + d] = bits_of(g.load_change[d]);
+  } else {
+    head[5] = word_of(g.normal_load, g.load_change[0]);
+    head[6] = word_of(g.load_change[1], g.load_change[2]);
+  }
+  head[9] = pair_of(g.walls, static_cast<int>(tail << 1) | g.held);
+  return head;
 }
 
 // ------------------------------------------------------------------------------------------------------------------ in and out
@@ -64,7 +82,7 @@ void GranuleStore::add(const StoredGranule& granule, const double* record, int l
   else
     first_free_ = slots_[s].next;
 
-  const auto head = head_of_row(granule);
+  const auto head = head_of_row(granule, 0);
   std::vector<std::uint64_t>& row = scratch_;
   row.resize(record_begin + static_cast<std::size_t>(length));
   std::copy(head.begin(), head.end(), row.begin());
@@ -127,19 +145,30 @@ StoredGranule GranuleStore::granule(int s) const {
   g.body = slots_[s].body;
   g.layout = static_cast<int>(row[3] >> 32);
   g.lock_step = static_cast<std::int64_t>(row[4]);
-  g.normal_load = number_of(row[5]);
-  g.load_change = Vec3(number_of(row[6]), number_of(row[7]), number_of(row[8]));
+  if (loads_ == Loads::exact) {
+    g.normal_load = number_of(row[5]);
+    g.load_change = Vec3(number_of(row[6]), number_of(row[7]), number_of(row[8]));
+  } else {
+    const auto first = floats_of(row[5]), second = floats_of(row[6]);
+    g.normal_load = first[0];
+    g.load_change = Vec3(first[1], second[0], second[1]);
+  }
   g.walls = static_cast<int>(row[9] & UINT32_MAX);
-  g.held = row[9] >> 32 != 0;
+  g.held = row[9] >> 32 & 1;
   return g;
 }
 
-void GranuleStore::read_record(int s, std::vector<double>& out) const {
+std::vector<std::uint64_t> GranuleStore::row_of(int s) const {
   const int length = rows_.length(slots_[s].row);
   std::vector<std::uint64_t> row(static_cast<std::size_t>(length));
   row[0] = tag_word(slots_[s].tag);
   rows_.get(slots_[s].row, row.data(), length);
-  out.resize(row.size() - record_begin);
+  return row;
+}
+
+void GranuleStore::read_record(int s, std::vector<double>& out) const {
+  const std::vector<std::uint64_t> row = row_of(s);
+  out.resize(row.size() - record_begin - tail_of(row));
   if (!out.empty()) std::memcpy(out.data(), row.data() + record_begin, out.size() * sizeof(double));
   if (const auto* known = transient_.of_tag.find(slots_[s].tag)) {
     std::size_t word = known->first;
@@ -149,14 +178,11 @@ void GranuleStore::read_record(int s, std::vector<double>& out) const {
 
 /// Keeps what has changed but for place and body.
 void GranuleStore::change(int s, const StoredGranule& before, const StoredGranule& after) {
-  const auto head = head_of_row(after);
-  if (head == head_of_row(before)) return;
-  const PackedRows::Place old = slots_[s].row;
-  std::vector<std::uint64_t> row(static_cast<std::size_t>(rows_.length(old)));
-  row[0] = head[0];
-  rows_.get(old, row.data(), static_cast<int>(row.size()));
+  if (head_of_row(after, 0) == head_of_row(before, 0)) return;
+  std::vector<std::uint64_t> row = row_of(s);
+  const auto head = head_of_row(after, tail_of(row));
   std::copy(head.begin() + 1, head.end(), row.begin() + 1);
-  rows_.drop(old);
+  rows_.drop(slots_[s].row);
   slots_[s].row = rows_.put(row.data(), static_cast<int>(row.size()));
   mass_ -= before.mass;
   mass_ += after.mass;
@@ -171,6 +197,22 @@ std::optional<Resident> GranuleStore::find(std::int64_t tag) const {
 StoredGranule GranuleStore::get(std::int64_t tag) const { return granule(slot_or_throw(tag)); }
 
 void GranuleStore::record(std::int64_t tag, std::vector<double>& out) const { read_record(slot_or_throw(tag), out); }
+
+void GranuleStore::tail(std::int64_t tag, std::vector<std::uint64_t>& out) const {
+  const std::vector<std::uint64_t> row = row_of(slot_or_throw(tag));
+  out.assign(row.end() - static_cast<std::ptrdiff_t>(tail_of(row)), row.end());
+}
+
+void GranuleStore::set_tail(std::int64_t tag, const std::vector<std::uint64_t>& tail) {
+  const int s = slot_or_throw(tag);
+  std::vector<std::uint64_t> row = row_of(s);
+  row.resize(row.size() - tail_of(row));
+  row.insert(row.end(), tail.begin(), tail.end());
+  std::uint64_t& last = row[record_begin - 1];
+  last = (last & ((std::uint64_t{1} << 33) - 1)) | static_cast<std::uint64_t>(tail.size()) << 33;
+  rows_.drop(slots_[s].row);
+  slots_[s].row = rows_.put(row.data(), static_cast<int>(row.size()));
+}
 
 bool GranuleStore::transient_known(std::int64_t tag) const { return transient_.of_tag.contains(narrow_tag(tag)); }
 

@@ -43,14 +43,18 @@ struct Resident {
 
 /// Granules with their engine records (opaque doubles), found by tag in O(1) and by place in O(neighbours). Each body has a grid
 /// of search cells in its own frame, so that a body that moves costs nothing here; bodies that stand still in the world share
-/// one grid, frame 0, so that many small ones cost no more than a large one. Some 90 bytes per granule of a few kinds.
-/// Local to the rank.
+/// one grid, frame 0, so that many small ones cost no more than a large one. Some 85 bytes per granule of a few kinds, 55 to
+/// 70 with rounded loads. Local to the rank.
 class GranuleStore {
  public:
   static constexpr int shared_frame = 0;  ///< that of all bodies that share(); any other frame has the number of its body
 
+  /// normal_load and load_change come back to the bit, or rounded to floats, as by rounded().
+  enum class Loads { exact, rounded };
+  static StoredGranule rounded(StoredGranule granule);
+
   /// cell: edge of the search cells in m; best near the largest contact distance. Throws std::invalid_argument if not > 0.
-  explicit GranuleStore(double cell);
+  explicit GranuleStore(double cell, Loads loads = Loads::exact);
 
   /// Takes a granule in. A tag that is in the store already, or that is no 32-bit number, is a std::logic_error. The words of
   /// the record at the indices `transient` are kept until forget_transient() and are 0.0 afterwards.
@@ -60,8 +64,15 @@ class GranuleStore {
 
   bool contains(std::int64_t tag) const { return slot_of(tag) != none; }
   std::optional<Resident> find(std::int64_t tag) const;
+  int body_of(std::int64_t tag) const {  ///< 0 if it is not there
+    const int s = slot_of(tag);
+    return s == none ? 0 : slots_[s].body;
+  }
   StoredGranule get(std::int64_t tag) const;                      ///< std::logic_error if it is not there
   void record(std::int64_t tag, std::vector<double>& out) const;  ///< likewise
+  /// Some words more, none at first; they go with it and are lost when it is taken out. Likewise.
+  void tail(std::int64_t tag, std::vector<std::uint64_t>& out) const;
+  void set_tail(std::int64_t tag, const std::vector<std::uint64_t>& tail);
   bool transient_known(std::int64_t tag) const;                   ///< it has transient words that are not forgotten yet
   void forget_transient() { transient_ = Transient(); }           ///< costs what was added since the last call
 
@@ -127,6 +138,9 @@ class GranuleStore {
   void for_each_frame(Visit visit) const {
     for (const auto& grid : grids_) visit(grid.first, grid.second.box.lo, grid.second.box.hi);
   }
+  /// Corners of the box around the centres in this frame, which has granules.
+  const Vec3& lowest(int frame) const { return grids_.at(frame).box.lo; }
+  const Vec3& highest(int frame) const { return grids_.at(frame).box.hi; }
   /// Calls visit(body, lo, hi) for each body that has granules here, with a box around their centres in its frame; larger than
   /// need be where granules have left.
   template <class Visit>
@@ -148,6 +162,10 @@ class GranuleStore {
  private:
   static constexpr int none = -1;
   static constexpr std::int32_t free_mark = INT32_MIN;
+  /// A granule's row: what head_of_row() says, then its engine record, then its tail. Tag, radius and mass come first, as key
+  /// words.
+  static constexpr int record_begin = 10;
+  using Head = std::array<std::uint64_t, record_begin>;
   struct Slot {
     std::array<std::uint32_t, 6> place;  // the bits of three doubles: 44 bytes in all, not 48
     std::int32_t tag = free_mark;
@@ -248,6 +266,9 @@ class GranuleStore {
   }
   void set_position(int s, const Vec3& p) { std::memcpy(slots_[s].place.data(), p.data(), sizeof(Slot::place)); }
   Resident resident(int s) const;
+  Head head_of_row(const StoredGranule& g, std::size_t tail) const;
+  std::vector<std::uint64_t> row_of(int s) const;
+  static std::size_t tail_of(const std::vector<std::uint64_t>& row) { return row[record_begin - 1] >> 33; }
   StoredGranule granule(int s) const;
   void read_record(int s, std::vector<double>& out) const;
   void change(int s, const StoredGranule& before, const StoredGranule& after);
@@ -268,6 +289,7 @@ class GranuleStore {
   void rebuild_index(std::size_t entries);
 
   double inverse_cell_;
+  Loads loads_;
   double largest_radius_ = 0;
   std::size_t size_ = 0;
   ExactSum mass_;

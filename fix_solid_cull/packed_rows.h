@@ -96,6 +96,7 @@ class PackedRows {
   static constexpr std::size_t patterns_per_length = 32;
   static constexpr unsigned look_at_all_every = 16;  // rows
   static constexpr int none = -1;
+  static constexpr std::size_t chunk_bytes = 2048;  // of the blobs of one length, of which there are many
   static constexpr std::uint32_t no_blob = UINT32_MAX;
 
   using Mask = std::array<std::uint64_t, longest / 64>;
@@ -130,7 +131,7 @@ class PackedRows {
     unsigned rows = 0;
   };
   struct Pool {
-    explicit Pool(std::size_t words) : rows(words) {}
+    explicit Pool(std::size_t words) : rows(words, chunk_bytes) {}
     ChunkedArray<std::uint64_t> rows;
     std::uint32_t first_free = no_blob;
   };

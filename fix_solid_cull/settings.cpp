@@ -99,7 +99,8 @@ const std::map<std::string, Reader>& readers() {
        }},
       {"store",
        [](Values& v, Settings& s) {
-         v.one_of("'exact'", {{"exact", [&] { s.store = Store::exact; }}});
+         v.one_of("'exact' or 'compact'",
+                  {{"exact", [&] { s.store = Store::exact; }}, {"compact", [&] { s.store = Store::compact; }}});
        }},
       {"restore",
        [](Values& v, Settings& s) {

@@ -9,7 +9,7 @@ namespace solidcull {
 enum class Exterior { live, sleep };
 enum class Motion { rigid, fixed };
 enum class Walls { closed, surface };
-enum class Store { exact };
+enum class Store { exact, compact };
 enum class Restore { exact };
 
 /// A file every so many steps; a '*' in its name becomes the step.

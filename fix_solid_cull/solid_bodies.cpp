@@ -60,7 +60,9 @@ int SolidBodies::root(int body) const {
 
 int SolidBodies::body_of(std::int64_t tag) const {
   const int* body = member_.find(narrow_tag(tag));
-  return body ? root(*body) : 0;
+  if (body) return root(*body);
+  const int other = elsewhere_ ? elsewhere_(tag) : 0;
+  return other ? root(other) : 0;
 }
 
 const Pose& SolidBodies::pose(int number) const {
@@ -296,7 +298,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       for (std::size_t at = 0; at < order.size(); ++at) {
         const GranuleMass g = mass_of(order[at]);
         off.mass.add(g.mass, place[at], g.radius, 1, g.held);
-        member_[narrow_tag(order[at])] = fresh;
+        if (int* member = member_.find(narrow_tag(order[at]))) *member = fresh;
         moved(order[at], fresh, place[at]);
       }
       off.summed = off.mass.count;

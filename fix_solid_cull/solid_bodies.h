@@ -115,6 +115,7 @@ class SolidBodies {
 
   /// Edges of the periodic box, 0 where it is not periodic (m).
   void set_periods(const Vec3& periods) { periods_ = periods; }
+  const Vec3& periods() const { return periods_; }
 
   /// A granule is locked: it joins the bodies of its frozen contacts (which merge if they were several), or founds one.
   /// Momentum and angular momentum are kept, but for what a grounded body is given.
@@ -123,6 +124,13 @@ class SolidBodies {
     Vec3 position = Vec3::Zero();  ///< frame of the body (m)
   };
   Place lock(std::int64_t tag, const MovingGranule& granule, const FrozenContacts& contacts, const MassOf& mass_of);
+
+  /// Names the body (or one that it swallowed) of a granule that leave() gave away, 0 of any other.
+  using BodyElsewhere = std::function<int(std::int64_t)>;
+  void set_elsewhere(BodyElsewhere body) { elsewhere_ = std::move(body); }
+  /// It stays in its body, which is named from elsewhere from here on, until take_in().
+  void leave(std::int64_t tag) { member_.erase(narrow_tag(tag)); }
+  void fit() { member_.fit(); }
 
   /// A body as it was (from a restart file), and a granule that was in it. Returns its number.
   int found(const SolidBody& body);
@@ -154,8 +162,9 @@ class SolidBodies {
   std::map<int, SolidBody>& bodies() { return bodies_; }
   const std::map<int, SolidBody>& bodies() const { return bodies_; }
   std::size_t size() const { return bodies_.size(); }
-  std::size_t locked() const { return member_.size(); }
+  std::size_t locked() const { return member_.size(); }  ///< but for those that are known from elsewhere
   std::size_t member_bytes() const { return member_.memory_bytes(); }
+  /// But for those that are known from elsewhere.
   template <class Visit>
   void for_each_member(Visit visit) const {
     member_.for_each([&](std::int64_t tag, int body) { visit(tag, root(body)); });
@@ -174,7 +183,7 @@ class SolidBodies {
   int found();
   int merge(int a, int b, Vec3 shift);
   int tie(int a, Vec3& position_in_a, int b, const Vec3& position_in_b);
-  bool is_member(std::int64_t tag) const { return member_.contains(narrow_tag(tag)); }
+  bool is_member(std::int64_t tag) const { return member_.contains(narrow_tag(tag)) || (elsewhere_ && elsewhere_(tag)); }
   static void stand_still(SolidBody& body);
   static void add(SolidBody& body, const RigidPart& part);
   static void centre_moved(SolidBody& body, const Vec3& from);
@@ -182,6 +191,7 @@ class SolidBodies {
   void sum_anew(int number, std::int64_t member, const FrozenContacts& contacts, const MassOf& mass_of);
 
   Vec3 periods_ = Vec3::Zero();
+  BodyElsewhere elsewhere_;
   FlatMap<int, std::int32_t> member_;   // tag -> body, to be resolved by root()
   mutable std::vector<int> parent_{0};  // union-find over body numbers; 0 is no body
   std::map<int, SolidBody> bodies_;     // living bodies only

@@ -240,7 +240,7 @@ class KeywordRefusals(Case):
         "carve x 4": ("carve", "x", CARVE), "carve 2 0.5": ("carve", "0.5", CARVE), "carve 2": ("carve", None, CARVE),
         "motion free": ("motion", "free", "'rigid' or 'fixed'"), "motion": ("motion", None, "'rigid' or 'fixed'"),
         "walls open": ("walls", "open", "'closed' or 'surface'"), "walls": ("walls", None, "'closed' or 'surface'"),
-        "store compact": ("store", "compact", "'exact'"), "store": ("store", None, "'exact'"),
+        "store none": ("store", "none", "'exact' or 'compact'"), "store": ("store", None, "'exact' or 'compact'"),
         "restore refill": ("restore", "refill", "'exact'"), "restore": ("restore", None, "'exact'"),
         "voxel fine": ("voxel", "fine", VOXEL), "voxel 0.05": ("voxel", "0.05", VOXEL), "voxel": ("voxel", None, VOXEL),
         "mesh x a.stl": ("mesh", "x", FILE), "mesh 10 a.obj": ("mesh", "a.obj", MESH), "mesh 10": ("mesh", None, MESH),

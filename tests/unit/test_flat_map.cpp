@@ -150,6 +150,22 @@ TEST(FlatMap, clear_gives_back_what_is_much_more_than_was_in_use) {
   EXPECT_EQ(map.memory_bytes(), 0u) << "not in use at all";
 }
 
+TEST(FlatMap, fit_gives_back_what_is_not_needed_and_loses_nothing) {
+  FlatMap<int> map;
+  for (int k = 0; k < 100000; ++k) map[k] = k + 1;
+  const std::size_t bytes = map.memory_bytes();
+  map.fit();
+  EXPECT_EQ(map.memory_bytes(), bytes) << "all of it is in use";
+  for (int k = 0; k < 99900; ++k) map.erase(k);
+  map.fit();
+  EXPECT_LT(map.memory_bytes(), 5000u);
+  EXPECT_EQ(map.size(), 100u);
+  for (int k = 99900; k < 100000; ++k) EXPECT_EQ(*map.find(k), k + 1);
+  FlatMap<int> none;
+  none.fit();
+  EXPECT_EQ(none.memory_bytes(), 0u);
+}
+
 TEST(FlatMap, a_map_of_numbers_of_32_bits_takes_14_bytes_per_element) {
   FlatMap<int, std::int32_t> map;
   double sum = 0, log_size = 0;

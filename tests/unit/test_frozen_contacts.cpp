@@ -112,6 +112,53 @@ TEST(FrozenContacts, erase_takes_all_contacts_of_a_granule_from_both_sides) {
   EXPECT_EQ(contacts.size(), 3u);
 }
 
+TEST(FrozenContacts, contacts_known_from_elsewhere_are_listed_with_the_others) {
+  FrozenContacts contacts = with_layout({true});
+  const double h[] = {1};
+  contacts.add(1, 2, h);
+  contacts.set_elsewhere([](std::int64_t tag, std::vector<std::int64_t>& partners) {
+    if (tag == 1) partners = {3, 4};
+  });
+  EXPECT_EQ(seen_by(contacts, 1), (std::map<std::int64_t, History>{{2, {1}}, {3, {}}, {4, {}}}));
+  EXPECT_EQ(seen_by(contacts, 2).size(), 1u);
+  std::set<std::int64_t> elsewhere;
+  contacts.for_each_elsewhere(1, [&](std::int64_t partner) { elsewhere.insert(partner); });
+  EXPECT_EQ(elsewhere, (std::set<std::int64_t>{3, 4}));
+  EXPECT_EQ(contacts.size(), 1u);
+  EXPECT_FALSE(contacts.contains(1, 3));
+}
+
+TEST(FrozenContacts, drop_takes_those_that_go_and_no_others) {
+  FrozenContacts contacts = with_layout({true});
+  const double h[] = {1};
+  for (std::int64_t tag = 1; tag <= 10; ++tag) contacts.add(0, tag, h);
+  contacts.add(2, 4, h);
+  contacts.drop(0, [](std::int64_t partner) { return partner % 2 == 0; });
+  EXPECT_EQ(contacts.size(), 6u);
+  EXPECT_EQ(seen_by(contacts, 0).size(), 5u);
+  EXPECT_EQ(seen_by(contacts, 2).size(), 1u);
+  EXPECT_EQ(seen_by(contacts, 3)[0], (History{-1}));
+}
+
+TEST(FrozenContacts, fit_gives_room_back_and_keeps_what_is_there) {
+  FrozenContacts contacts = with_layout({true, false});
+  for (std::int64_t tag = 1; tag <= 50000; ++tag) {
+    const double h[] = {double(tag), 1};
+    contacts.add(tag + 1, tag, tag % 3 ? h : nullptr);
+  }
+  const std::size_t bytes = contacts.memory_bytes();
+  contacts.fit();
+  EXPECT_EQ(contacts.memory_bytes(), bytes) << "all of it is in use";
+  for (std::int64_t tag = 1; tag <= 49000; ++tag) contacts.erase(tag);
+  EXPECT_EQ(contacts.memory_bytes(), bytes);
+  contacts.fit();
+  EXPECT_LT(contacts.memory_bytes(), bytes / 10);
+  EXPECT_EQ(contacts.size(), 1000u);
+  for (std::int64_t tag = 49001; tag <= 50000; ++tag)
+    EXPECT_EQ(seen_by(contacts, tag)[tag + 1], tag % 3 ? (History{-double(tag), 1}) : History());
+  EXPECT_EQ(contacts.layout(), (std::vector<bool>{true, false}));
+}
+
 TEST(FrozenContacts, places_of_erased_contacts_are_used_again) {
   FrozenContacts contacts = with_layout({true, false, true});
   const double h[] = {1, 2, 3};

@@ -310,7 +310,7 @@ GranuleStore bed(int edge, int radii, double d) {
                                       number(random),
                                       number(random),
                                       number(random),
-                                      double(tag),
+                                      number_of(static_cast<std::uint64_t>(tag)),  // as the engine packs its ints
                                       1,
                                       1,
                                       537395712,
@@ -437,9 +437,8 @@ TEST(GranuleStore, rows_of_all_kinds_of_bits_come_back_as_they_were) {
 TEST(GranuleStore, a_word_that_was_like_the_tag_by_chance_does_no_harm) {
   GranuleStore store(1.0);
   for (std::int64_t tag = 1; tag <= 1000; ++tag) {
-    const double t = static_cast<double>(tag);
-    const double record[] = {t, 1, 1, 0.1, 0.1 + 0.2};
-    StoredGranule g = granule(tag, Vec3(t, 0, 0), 0.1);
+    const double record[] = {number_of(static_cast<std::uint64_t>(tag)), 1, 1, 0.1, 0.1 + 0.2};
+    StoredGranule g = granule(tag, Vec3(static_cast<double>(tag), 0, 0), 0.1);
     g.type = 1;
     store.add(g, record, 5);
   }
@@ -447,7 +446,7 @@ TEST(GranuleStore, a_word_that_was_like_the_tag_by_chance_does_no_harm) {
   std::vector<double> record;
   for (std::int64_t tag = 1; tag <= 1000; ++tag) {
     store.record(tag, record);
-    EXPECT_EQ(record, (std::vector<double>{static_cast<double>(tag), 1, 1, 0.1, 0.1 + 0.2}));
+    EXPECT_EQ(record, (std::vector<double>{number_of(static_cast<std::uint64_t>(tag)), 1, 1, 0.1, 0.1 + 0.2}));
   }
 }
 

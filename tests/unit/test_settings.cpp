@@ -117,6 +117,11 @@ TEST(Settings, bodies_move_unless_they_are_fixed) {
   EXPECT_EQ(parsed("motion fixed motion rigid").motion, Motion::rigid);
 }
 
+TEST(Settings, the_store_is_exact_or_compact) {
+  EXPECT_EQ(parsed("store exact").store, Store::exact);
+  EXPECT_EQ(parsed("store compact").store, Store::compact);
+}
+
 TEST(Settings, keywords_come_in_any_order_and_the_last_word_counts) {
   EXPECT_EQ(parsed("calm 4 every 10").calm, parsed("every 10 calm 4").calm);
   EXPECT_EQ(parsed("calm 4 calm 6").calm, 6);
@@ -219,8 +224,8 @@ const Refusal refusals[] = {
     {"motion", "keyword 'motion' ends too early: give 'rigid' or 'fixed'"},
     {"walls open", "keyword 'walls' has the value 'open': give 'closed' or 'surface'"},
     {"walls", "keyword 'walls' ends too early: give 'closed' or 'surface'"},
-    {"store compact", "keyword 'store' has the value 'compact': give 'exact'"},
-    {"store", "keyword 'store' ends too early: give 'exact'"},
+    {"store none", "keyword 'store' has the value 'none': give 'exact' or 'compact'"},
+    {"store", "keyword 'store' ends too early: give 'exact' or 'compact'"},
     {"restore refill", "keyword 'restore' has the value 'refill': give 'exact'"},
     {"restore", "keyword 'restore' ends too early: give 'exact'"},
 
