@@ -222,6 +222,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void prepare_locking();
   void judge_worth(std::int64_t chosen, std::int64_t exterior);
   void schedule_next_look();
+  bool looks_quickly() const;
+  int looks_in_a_row() const;
   int quick_interval() const;
   void ask_for_build(std::int64_t step);
 

@@ -33,8 +33,8 @@ constexpr int longest_wait = 10;
 constexpr double wall_still_there = 0.01;
 // looks that culling waits after bodies woke as a whole
 constexpr int shortest_pause = 2, longest_pause = 32;
-// the first looks of a run, until something is culled, come this many times as often
-constexpr int quick = 5;
+// the first looks of a run, until something is culled, come this many times as often; so many in a row are enough of them
+constexpr int quick = 5, quick_calm = 3;
 
 }  // namespace
 
@@ -207,7 +207,7 @@ bool FixSolidCull::find_calm() {
   const int owned = atom->nlocal;
   // over a shorter time less motion tells it from rest
   SolidStateLaw law = solid_state_;
-  if (quick_looks_ > 0 && locked_everywhere_ == 0) law.speed /= quick;
+  if (looks_quickly()) law.speed /= quick;
   std::vector<char> touching(owned, 0), moving(owned, 0), loaded(owned, 0), drifting(owned, 0);
   std::vector<Vec3> around(owned, Vec3::Zero());  // sum of mass times acceleration of what each granule touches
   std::vector<double> mass(owned, 0.0);
@@ -278,14 +278,14 @@ bool FixSolidCull::find_calm() {
       solid = law.at_rest(vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]) && law.balanced(acceleration[i], Vec3::Zero());
     }
     e.calm = solid ? e.calm + 1 : 0;
-    candidates = candidates || e.calm >= settings_.calm;
+    candidates = candidates || e.calm >= looks_in_a_row();
   }
   joins_.clear();
   for (const Pair& p : between_bodies)
     for (const int end : {p.i, p.j})
       if (end < owned) shell_[end].calm = moving[end] ? 0 : shell_[end].calm + 1;
   for (const Pair& p : between_bodies) {
-    const bool long_enough = shell_[p.i].calm >= settings_.calm && (p.j >= owned || shell_[p.j].calm >= settings_.calm);
+    const bool long_enough = shell_[p.i].calm >= looks_in_a_row() && (p.j >= owned || shell_[p.j].calm >= looks_in_a_row());
     if (!long_enough || moving[p.i] || (p.j < owned && moving[p.j])) continue;
     const double* x = atom->x[p.i];
     joins_.insert(joins_.end(), {x[0], x[1], x[2], double(atom->tag[p.i]), double(atom->tag[p.j])});
@@ -415,7 +415,7 @@ void FixSolidCull::choose() {
   const double depth = settings_.depth * diameter_;
   for (int i = 0; i < atom->nlocal; ++i) {
     ShellEntry& e = shell_[i];
-    if (e.locked || e.calm < settings_.calm) continue;
+    if (e.locked || e.calm < looks_in_a_row()) continue;
     e.nearest_void = surface_->void_within(observer_.to_frame(vec(atom->x[i])), depth, e.nearest_void);
     if (!e.nearest_void.none()) {
       e.waited = 0;
@@ -428,7 +428,7 @@ void FixSolidCull::choose() {
 
 void FixSolidCull::leave_out_what_is_not_steady() {
   // one look before they could go, so that none is lost
-  const int from = std::max(1, settings_.calm - 1);
+  const int from = std::max(1, looks_in_a_row() - 1);
   FlatMap<char> chosen;
   for (const std::int64_t tag : chosen_) chosen[tag] = 1;
   std::vector<char> asked(atom->nlocal, 0);
@@ -442,7 +442,7 @@ void FixSolidCull::leave_out_what_is_not_steady() {
     if (needs_surface())
       chosen.erase(atom->tag[i]);
     else
-      shell_[i].calm = std::min(shell_[i].calm, settings_.calm - 1);
+      shell_[i].calm = std::min(shell_[i].calm, looks_in_a_row() - 1);
   }
   const auto left_out = [&](std::int64_t tag) { return !chosen.contains(tag); };
   chosen_.erase(std::remove_if(chosen_.begin(), chosen_.end(), left_out), chosen_.end());
@@ -457,7 +457,7 @@ void FixSolidCull::choose_asleep() {
     std::vector<Sphere> spheres;
     std::vector<double> rows;
     for (int i = 0; i < atom->nlocal; ++i) {
-      if (shell_[i].locked || shell_[i].calm >= settings_.calm) continue;
+      if (shell_[i].locked || shell_[i].calm >= looks_in_a_row()) continue;
       const Sphere s = sphere(i);
       spheres.push_back(s);
       rows.insert(rows.end(), {s.centre[0], s.centre[1], s.centre[2], s.radius});
@@ -470,7 +470,7 @@ void FixSolidCull::choose_asleep() {
   for (int i = 0; i < atom->nlocal; ++i) {
     ShellEntry& e = shell_[i];
     if (e.locked) continue;
-    if (e.calm < settings_.calm || (cover > 0 && awake.any_near(sphere(i), cover))) {
+    if (e.calm < looks_in_a_row() || (cover > 0 && awake.any_near(sphere(i), cover))) {
       e.waited = 0;
       continue;
     }
@@ -596,7 +596,7 @@ void FixSolidCull::ask_for_build(std::int64_t step) {
 void FixSolidCull::schedule_next_look() {
   // a bed that rests when the run begins is culled at once; else a look comes in time for what it must watch
   const std::int64_t now = last_look_ = update->ntimestep;
-  if (quick_looks_ > 0 && locked_everywhere_ == 0) {
+  if (looks_quickly()) {
     --quick_looks_;
     next_look_ = now + quick_interval();
     return;
@@ -607,6 +607,10 @@ void FixSolidCull::schedule_next_look() {
   const std::int64_t wait = (no_cull_until_ + look_every_ - 1) / look_every_ * look_every_;
   next_look_ = std::max(next_look_, wait);
 }
+
+bool FixSolidCull::looks_quickly() const { return quick_looks_ > 0 && locked_everywhere_ == 0; }
+
+int FixSolidCull::looks_in_a_row() const { return looks_quickly() ? std::min(settings_.calm, quick_calm) : settings_.calm; }
 
 int FixSolidCull::quick_interval() const { return settings_.every ? look_every_ : std::max(look_every_ / quick, 5); }
 

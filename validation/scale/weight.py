@@ -45,11 +45,11 @@ def one_part(size, drop, settings):
     files = place / f"{size}-{'drop' if drop else 'unfix'}"
     variables = {"restart": made_bed["restart"], "floormesh": made_bed["floor"], "sidesmesh": sides(length, width), "files": files,
                  "drop": int(drop), "culling": settings.culling, "rows": 60, "after": 40 if settings.few_steps else 120}
-    text, _ = scale.run_engine(HERE / "weight.in", files.with_suffix(".log"), variables)
+    text, _ = scale.run_engine(HERE / "weight.in", Path(f"{files}.log"), variables)
     rows, (asleep, woken) = variables["rows"], [t for t in twin.parse_log(text) if "cull[3]" in "".join(t.columns) and len(t.rows) > 1][-2:]
     result = {"granules": len(np.load(made_bed["granules"])), "meshes": {}}
     for mesh in ("floor", "sides"):
-        free, late = (activity.element_loads(files.with_name(f"{files.name}.{mesh}.{k * rows}.vtk")) for k in (1, 4))
+        free, late = (activity.element_loads(Path(f"{files}.{mesh}.{k * rows}.vtk")) for k in (1, 4))
         size_of = float(np.linalg.norm(free, axis=1).mean()) or 1.0
         total = float(np.linalg.norm(late.sum(axis=0) - free.sum(axis=0)) / max(1e-30, np.linalg.norm(free, axis=1).sum()))
         result["meshes"][mesh] = {"elements": len(free), "mean load (N)": size_of, "total, change": total,
@@ -59,7 +59,7 @@ def one_part(size, drop, settings):
     result["interior"] = {"asleep": int(asleep.rows[-1][column["cull[3]"]]),
                           "rows": [[int(r[column["Step"]] - woken.rows[0][column["Step"]]), int(r[column["cull[1]"]]), int(r[column["cull[3]"]])]
                                    for r in woken.rows]}
-    before, after = np.load(made_bed["granules"]), twin.read_final(Path(str(files) + ".final"))
+    before, after = np.load(made_bed["granules"]), twin.read_final(Path(f"{files}.final"))
     result["lost"] = result["granules"] - len(after)
     fall = GRAVITY * (variables["after"] * DT)**2 / 2
     result["mean fall over free fall"] = float((before["z"] - after["z"]).mean() / fall)
