@@ -1,6 +1,7 @@
 #include "frozen_wall_loads.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace solidcull {
 
@@ -79,7 +80,7 @@ double FrozenWallLoads::weigh(int body, const Vec3& load) {
   double sum = 0;
   const auto found = bodies_.find(body);
   if (found == bodies_.end()) return sum;
-  for (auto& e : found->second) sum += e.second.share = std::max(0.0, -e.second.force.dot(load));
+  for (auto& e : found->second) sum += e.second.share = std::abs(e.second.force.dot(load));
   return sum;
 }
 

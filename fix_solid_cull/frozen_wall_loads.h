@@ -42,8 +42,8 @@ class FrozenWallLoads {
   bool holds(int body) const { return bodies_.count(body) != 0; }
   Vec3 force(int body) const;  ///< of all walls on the stored granules of this body (N)
 
-  /// Weights by which the walls bear a load on the body (N) in addition to what is frozen: those that push against it already, as
-  /// much as they do. Returns their sum on this rank; share_out() then divides by the sum over all ranks.
+  /// Weights by which the walls bear a load on the body (N) in addition to what is frozen: each as much as it bears along that line
+  /// already. What pushes against the load pushes more, what pushes along with it less. Returns their sum on this rank; share_out() then divides by the sum over all ranks.
   double weigh(int body, const Vec3& load);
   void share_out(int body, double sum);
 

@@ -73,6 +73,7 @@ class Decks(unittest.TestCase):
                         self.assertTrue(against["metrics"][name]["good"], f"{kind}, {name}: {against['metrics'][name]}")
                     loads = against["element_loads"]
                     self.assertLess(loads["largest difference (N)"], 0.1 * loads["mean load (N)"])
+        self.assertEqual([r["lost"] for r in self.run_script(folder / "weight.py", folder / "out" / "few" / "weight.json").values()], [0, 0])
         choices = self.run_script(folder / "choices.py", folder / "out" / "few" / "choices.json")
         self.assertEqual({c["lost"] for c in choices.values()}, {0})
         self.assertGreater(choices["sleep"]["over_exterior"], choices["live"]["over_exterior"])

@@ -237,17 +237,26 @@ TEST(FrozenWallLoads, an_element_that_does_not_bear_that_way_gets_nothing) {
   loads.share_out(1, loads.weigh(1, {0, 0, -1}));
   EXPECT_DOUBLE_EQ(listed(loads).at({1, 0, 3}).share, 1);
   EXPECT_EQ(listed(loads).at({1, 1, 5}).share, 0.0);
-  loads.share_out(1, loads.weigh(1, {1, 0, 0}));  // pushed against the side at +x, whose force on the granules is along -x
+  loads.share_out(1, loads.weigh(1, {1, 0, 0}));  // towards the side at +x: it pushes more, the one at -x less
   EXPECT_EQ(listed(loads).at({1, 0, 3}).share, 0.0);
-  EXPECT_EQ(listed(loads).at({1, 1, 5}).share, 0.0);
-  EXPECT_DOUBLE_EQ(listed(loads).at({1, 1, 6}).share, 1);
+  EXPECT_DOUBLE_EQ(listed(loads).at({1, 1, 5}).share, 0.5);
+  EXPECT_DOUBLE_EQ(listed(loads).at({1, 1, 6}).share, 0.5);
 }
 
-TEST(FrozenWallLoads, where_no_element_bears_that_way_there_are_no_shares) {
+TEST(FrozenWallLoads, a_load_that_lifts_relieves_what_carries) {
+  // the floor carries 20, a side holds down with 1: nearly all of the relief is the floor's
+  FrozenWallLoads loads;
+  loads.add(7, 1, {load(0, 3, {0, 0, 20}), load(1, 5, {2, 0, -1})});
+  loads.share_out(1, loads.weigh(1, {0, 0, 1}));
+  EXPECT_DOUBLE_EQ(listed(loads).at({1, 0, 3}).share, 20.0 / 21);
+  EXPECT_DOUBLE_EQ(listed(loads).at({1, 1, 5}).share, 1.0 / 21);
+}
+
+TEST(FrozenWallLoads, where_no_element_bears_along_that_line_there_are_no_shares) {
   FrozenWallLoads loads;
   loads.add(7, 1, {up(3, 1)});
   loads.share_out(1, loads.weigh(1, {0, 0, -1}));
-  const double sum = loads.weigh(1, {0, 0, 1});  // lifted
+  const double sum = loads.weigh(1, {1, 0, 0});
   EXPECT_EQ(sum, 0.0);
   loads.share_out(1, sum);
   EXPECT_EQ(shares_of(loads, 1), 0.0);
