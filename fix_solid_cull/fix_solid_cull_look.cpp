@@ -520,7 +520,8 @@ void FixSolidCull::prepare_locking() {
   }
 }
 
-/// The load on these owned granules, from look to look: one that still changes is no solid state, however slowly its granule moves.
+/// The load on these owned granules, from look to look: one that still changes is no solid state, however slowly its granule
+/// moves.
 std::vector<char> FixSolidCull::find_steady(const std::vector<char>& asked) {
   const int owned = atom->nlocal;
   std::vector<double> normal(owned, 0.0);

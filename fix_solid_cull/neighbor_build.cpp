@@ -1,7 +1,7 @@
 // The engine's granular neighbour build, by size: the same pairs in the same order with the same contact histories, found through
-// SphereLevels. The engine's bins are as wide as half the reach of the largest granule, and each granule looks at all within them:
-// with a ball of eight diameters in the bed a build costs ten steps. Decks that have a fix solid/cull get this one, others and
-// those with exclusions, included groups or triclinic boxes the engine's own. Local.
+// SphereLevels. The engine's bins are as wide as half the reach of the largest granule, and each granule looks at all within
+// them: with a ball of eight diameters in the bed a build costs ten steps. Decks that have a fix solid/cull get this one, others
+// and those with exclusions, included groups or triclinic boxes the engine's own. Local.
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
