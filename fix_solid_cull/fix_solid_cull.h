@@ -222,6 +222,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void prepare_locking();
   void judge_worth(std::int64_t chosen, std::int64_t exterior);
   void schedule_next_look();
+  double kinetic_energy_of_exterior() const;
+  void come_back_where_it_calmed();
   bool looks_quickly() const;
   int looks_in_a_row() const;
   int quick_interval() const;
@@ -444,6 +446,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::int64_t builds_asked_ = 0;   // neighbour lists built because this fix asked, since then
   std::int64_t restored_then_ = 0;  // granules restored until then
   bool told_no_worth_ = false;
+  double energy_then_ = 0;  // kinetic energy of what was exterior when culling began to wait (J); 0: it does not
   int quick_looks_ = 0;  // left at the start of a run in which nothing is culled yet
   std::int64_t next_look_ = -1, last_look_ = INT32_MIN;
   std::int64_t membership_version_ = 0;

@@ -33,6 +33,9 @@ constexpr int longest_wait = 10;
 constexpr double wall_still_there = 0.01;
 // looks that culling waits after bodies woke as a whole
 constexpr int shortest_pause = 2, longest_pause = 32;
+// culling that waits comes back when the kinetic energy of what is exterior has fallen to this share
+constexpr double calmed_share = 0.25;
+constexpr int looks_between_glances = 15;
 // the first looks of a run, until something is culled, come this many times as often; so many in a row are enough of them
 constexpr int quick = 5, quick_calm = 3;
 
@@ -45,6 +48,7 @@ void FixSolidCull::look() {
   watch_effective_gravity(false);
   gravity_then_ = g;
   pause_where_bodies_wake();
+  come_back_where_it_calmed();
   const bool may_cull = update->ntimestep >= no_cull_until_;
   bool candidates = false;
   joins_.clear();
@@ -85,6 +89,23 @@ void FixSolidCull::look() {
     restored_then_ = ledger_.granules_restored();
   }
   schedule_next_look();
+}
+
+double FixSolidCull::kinetic_energy_of_exterior() const {
+  double energy = 0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (!shell_[i].locked) energy += 0.5 * atom->rmass[i] * vec(atom->v[i]).squaredNorm();
+  MPI_Allreduce(MPI_IN_PLACE, &energy, 1, MPI_DOUBLE, MPI_SUM, world);
+  return energy;
+}
+
+/// Culling waits because it did not pay: what was true then need not be true of a scene that has come to rest since.
+void FixSolidCull::come_back_where_it_calmed() {
+  if (update->ntimestep >= no_cull_until_ || energy_then_ <= 0) return;
+  if (kinetic_energy_of_exterior() > calmed_share * energy_then_) return;
+  energy_then_ = 0;
+  no_cull_until_ = update->ntimestep;
+  worth_ = WorthWatch();
 }
 
 void FixSolidCull::pause_where_bodies_wake() {
@@ -582,6 +603,7 @@ void FixSolidCull::judge_worth(std::int64_t chosen, std::int64_t exterior) {
   const int wait = worth_.judge(saved, spent, culling);
   if (wait == 0) return;
   no_cull_until_ = std::max(no_cull_until_, update->ntimestep + static_cast<std::int64_t>(wait) * look_every_);
+  energy_then_ = kinetic_energy_of_exterior();
   if (told_no_worth_ || !worth_.waits_longest()) return;
   told_no_worth_ = true;
   say("fix " + std::string(id) + " solid/cull: among " + std::to_string(exterior) +
@@ -605,7 +627,8 @@ void FixSolidCull::schedule_next_look() {
   quick_looks_ = 0;
   next_look_ = (now / look_every_ + 1) * look_every_;
   if (locked_everywhere_ > 0 || stored_everywhere_ > 0) return;
-  const std::int64_t wait = (no_cull_until_ + look_every_ - 1) / look_every_ * look_every_;
+  std::int64_t wait = (no_cull_until_ + look_every_ - 1) / look_every_ * look_every_;
+  if (energy_then_ > 0) wait = std::min(wait, next_look_ + looks_between_glances * look_every_);
   next_look_ = std::max(next_look_, wait);
 }
 
