@@ -30,7 +30,7 @@ MeshLoads::MeshLoads(LAMMPS_NS::LAMMPS* lmp) : Pointers(lmp) { listeners().push_
 MeshLoads::~MeshLoads() { listeners().erase(std::find(listeners().begin(), listeners().end(), this)); }
 
 void MeshLoads::connect() {
-  meshes_.clear();
+  for (Mesh& m : meshes_) m.fix = nullptr;
   seen_.clear();
   for (int i = 0; i < modify->n_fixes_style("wall/gran"); ++i) {
     auto* wall = static_cast<FixWallGran*>(modify->find_fix_style("wall/gran", i));
@@ -40,7 +40,12 @@ void MeshLoads::connect() {
       if (!stress || !stress->trackStress()) continue;
       Vec3 reference;
       for (int d = 0; d < 3; ++d) reference[d] = stress->compute_vector(6 + d);
-      meshes_.push_back({fix, stress, reference, !fix->triMesh()->isMoving()});
+      const std::size_t number = std::find(names_.begin(), names_.end(), fix->id) - names_.begin();
+      if (number == names_.size()) {
+        names_.emplace_back(fix->id);
+        meshes_.emplace_back();
+      }
+      meshes_[number] = {fix, stress, reference, !fix->triMesh()->isMoving()};
     }
   }
 }
@@ -71,7 +76,9 @@ std::vector<WallLoad> MeshLoads::of(std::int64_t tag) {
 }
 
 void MeshLoads::press(int mesh, int element, const Vec3& force, const Vec3& torque) {
-  Mesh& m = meshes_[mesh];
+  if (static_cast<std::size_t>(mesh) >= meshes_.size() || !meshes_[mesh].fix) return;  // taken out of the deck since
+  const Mesh& m = meshes_[mesh];
+  if (element < 0 || element >= m.fix->triMesh()->size()) return;
   double f[3], t[3];
   set(f, force);
   set(t, torque);

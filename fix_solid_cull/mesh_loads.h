@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "frozen_wall_loads.h"
@@ -21,15 +22,15 @@ class MeshLoads : protected LAMMPS_NS::Pointers {
   ~MeshLoads();
   MeshLoads(const MeshLoads&) = delete;
 
-  /// Finds the deck's meshes again; they come and go between runs.
+  /// Finds the deck's meshes again; they come and go between runs, and keep their numbers.
   void connect();
   /// The engine begins to compute forces: what was seen before is over.
   void begin_step() { seen_.clear(); }
   /// What still elements did to the granule in this step.
   std::vector<WallLoad> of(std::int64_t tag);
 
-  /// A mesh element bears this in addition (N, N m about the mesh's point of reference). After the engine's wall forces and
-  /// before it sums them.
+  /// A mesh element bears this in addition (N, N m about the mesh's point of reference); one that has gone bears nothing. After
+  /// the engine's wall forces and before it sums them.
   void press(int mesh, int element, const Vec3& force, const Vec3& torque);
 
   /// A wall granule's contact, told by the engine's own call, see register_styles.cpp.
@@ -37,16 +38,17 @@ class MeshLoads : protected LAMMPS_NS::Pointers {
 
  private:
   struct Mesh {
-    LAMMPS_NS::FixMeshSurface* fix;
-    LAMMPS_NS::MeshModuleStress* stress;
-    Vec3 reference;
-    bool still;
+    LAMMPS_NS::FixMeshSurface* fix = nullptr;
+    LAMMPS_NS::MeshModuleStress* stress = nullptr;
+    Vec3 reference = Vec3::Zero();
+    bool still = false;
   };
   struct Seen {
     std::int64_t tag;
     WallLoad load;
   };
-  std::vector<Mesh> meshes_;
+  std::vector<Mesh> meshes_;        // by number
+  std::vector<std::string> names_;  // their IDs
   std::vector<Seen> seen_;
   bool sorted_ = false;
 };

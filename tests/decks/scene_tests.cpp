@@ -88,19 +88,42 @@ TEST(Scenes, ABedThatSleepsStillWeighsOnItsWalls) {
   EXPECT_LT(lowest(), before - 0.0005) << "nothing follows the floor";
 }
 
+TEST(Scenes, WhatRestsOnAFloorThatIsUnfixedFalls) {
+  const Bed bed = mesh_bed("asleep");
+  Engine e;
+  e.run(read_bed(bed) + "fix cull all solid/cull exterior sleep every 50\nrun 1500\n");
+  ASSERT_GT(f(e, 3), 1250);
+  const double weight = std::abs(e.vector("floor", 3)), friction = e.vector("side", 3);
+  // the side is the only mesh now: it must not be given what the floor bore
+  e.run("unfix meshes\nunfix floor\nfix meshes all wall/gran " + bed.contact + " mesh n_meshes 1 meshes side\nrun 1\n");
+  EXPECT_NEAR(e.vector("side", 3), friction, 0.05 * weight);
+  e.run("run 400\n");
+  EXPECT_GT(f(e, 7), 1250) << "what rested on the floor wakes";
+  e.run("unfix cull\nrun 0\n");
+  EXPECT_EQ(e.state().size(), 1300u);
+
+  Engine none;  // no mesh is left at all
+  none.run(read_bed(bed) + "fix cull all solid/cull exterior sleep every 50\nrun 1500\n");
+  none.run("unfix meshes\nunfix floor\nunfix side\nrun 50\nunfix cull\nrun 0\n");
+  EXPECT_EQ(none.state().size(), 1300u);
+}
+
 TEST(Scenes, WhatIsInsertedIntoASleepingBedFindsItsGranules) {
   Engine e;
   e.run(read_bed(mesh_bed("asleep")) + "fix cull all solid/cull exterior sleep every 50\nrun 1500\n");
   ASSERT_GT(f(e, 3), 1250);
   // once, and more at a rate, from the middle of the bed upwards; the region reaches over the bed
   const std::string where = " overlapcheck yes all_in yes vel constant 0 0 -0.1 region pour";
-  e.run("fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0008\n"
-        "fix dist all particledistribution/discrete 32452843 1 t1 1.0\n"
-        "region pour block 0 0.026 0 0.026 0.012 0.045\n"
-        "fix once all insert/pack seed 32452867 distributiontemplate dist maxattempt 300 insert_every once" + where +
-        " volumefraction_region 0.45\n"
-        "fix rate all insert/rate/region seed 49979687 distributiontemplate dist maxattempt 100 nparticles 60 particlerate 10000 "
-        "insert_every 100" + where + "\nrun 1000\nunfix once\nunfix rate\nunfix cull\nrun 0\n");
+  e.run(
+      "fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0008\n"
+      "fix dist all particledistribution/discrete 32452843 1 t1 1.0\n"
+      "region pour block 0 0.026 0 0.026 0.012 0.045\n"
+      "fix once all insert/pack seed 32452867 distributiontemplate dist maxattempt 300 insert_every once" +
+      where +
+      " volumefraction_region 0.45\n"
+      "fix rate all insert/rate/region seed 49979687 distributiontemplate dist maxattempt 100 nparticles 60 particlerate 10000 "
+      "insert_every 100" +
+      where + "\nrun 1000\nunfix once\nunfix rate\nunfix cull\nrun 0\n");
   const State all = e.state();
   EXPECT_GT(all.size(), 1350u) << "granules are inserted";
   double deepest = 0;
@@ -204,7 +227,8 @@ double load_change_at_wake_up(double plate_speed) {
   e.run(bed.extra + "fix down all move/mesh mesh plate linear 0 0 -0.02\nfix visc all viscous 0.002\nrun 0\n");
   while (e.vector("plate", 3) < 0.2) e.run("run 20 pre no post no\n");
   e.run(
-      "unfix down\nrun 4000\nunfix visc\nrun 1000\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.5 tolerance 1 0\nrun 1000\n");
+      "unfix down\nrun 4000\nunfix visc\nrun 1000\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.5 tolerance 1 "
+      "0\nrun 1000\n");
   EXPECT_GT(f(e, 3), 100);
   EXPECT_EQ(f(e, 8), 0);
   const double before = e.vector("plate", 3);
@@ -301,12 +325,13 @@ TEST(Scenes, ABlowOfGivenExcessCarvesTheBallsOfTheLaw) {
 TEST(Scenes, TheRegionHoldsTheBodiesAndNothingElse) {
   const Bed bed = mesh_bed("region");
   Engine e;
-  e.run(read_bed(bed) +
-        "run 0\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.5\nrun 500\nrun 0\nregion solid interface/mesh cull\n"
-        "region rest interface/mesh cull side out\ngroup held region solid\nvariable held equal count(held)\n"
-        "variable both equal count(all,solid)+count(all,rest)\nvariable one atom 1\ncompute inside all reduce/region solid sum "
-        "v_one\n"
-        "variable inside equal c_inside\nthermo_style custom step atoms c_inside\nrun 0\n");
+  e.run(
+      read_bed(bed) +
+      "run 0\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.5\nrun 500\nrun 0\nregion solid interface/mesh cull\n"
+      "region rest interface/mesh cull side out\ngroup held region solid\nvariable held equal count(held)\n"
+      "variable both equal count(all,solid)+count(all,rest)\nvariable one atom 1\ncompute inside all reduce/region solid sum "
+      "v_one\n"
+      "variable inside equal c_inside\nthermo_style custom step atoms c_inside\nrun 0\n");
   EXPECT_EQ(e.variable("both"), f(e, 1) + f(e, 2));
   EXPECT_EQ(e.variable("held"), e.variable("inside"));
   // the interface granules and no other; at rough places of the surface an exterior centre may lie within half a voxel
