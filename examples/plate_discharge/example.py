@@ -256,7 +256,7 @@ def main(argv=None):
     p = argparse.ArgumentParser(prog="example.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--unculled", type=int, default=1, metavar="N", help="unculled runs (default 1: an hour each)")
     p.add_argument("--culled", type=int, default=1, metavar="N", help="culled runs (default 1; 0: unculled alone)")
-    p.add_argument("--fix", metavar="KEYWORDS", default="tolerance 10 0", help='of the fix, in one word (default "tolerance 10 0")')
+    p.add_argument("--fix", metavar="KEYWORDS", default="exterior sleep tolerance 10 0", help='of the fix, in one word (default "exterior sleep tolerance 10 0")')
     p.add_argument("--steps", type=int, help="of the discharge (default 142500: to t = 15 s)")
     p.add_argument("--few-steps", action="store_true", help="500 granules, 3,100 steps: that the decks still run")
     a = p.parse_args(argv)
