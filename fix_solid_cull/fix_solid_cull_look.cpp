@@ -101,7 +101,8 @@ double FixSolidCull::kinetic_energy_of_exterior() const {
 
 /// Culling waits because it did not pay: what was true then need not be true of a scene that has come to rest since.
 void FixSolidCull::come_back_where_it_calmed() {
-  if (update->ntimestep >= no_cull_until_ || energy_then_ <= 0) return;
+  if (update->ntimestep >= no_cull_until_) energy_then_ = 0;  // the wait is over
+  if (energy_then_ <= 0) return;
   if (kinetic_energy_of_exterior() > calmed_share * energy_then_) return;
   energy_then_ = 0;
   no_cull_until_ = update->ntimestep;
@@ -117,6 +118,7 @@ void FixSolidCull::pause_where_bodies_wake() {
   if (2 * counts[0] > counts[1]) {
     pause_ = std::min(std::max(2 * pause_, shortest_pause), longest_pause);
     no_cull_until_ = update->ntimestep + pause_ * look_every_;
+    energy_then_ = 0;  // not a wait for lack of worth: calm alone does not end it
   } else if (pause_ > 0 && update->ntimestep > no_cull_until_ + 4 * pause_ * look_every_) {
     pause_ = 0;
   }

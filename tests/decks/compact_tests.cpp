@@ -35,16 +35,6 @@ double energy_of_height(const State& s) {
   return sum;
 }
 
-void expect_same_granules(const State& a, const State& b) {
-  ASSERT_EQ(a.size(), b.size());
-  for (const auto& g : a) {
-    ASSERT_TRUE(b.count(g.first)) << "granule " << g.first << " was lost";
-    EXPECT_EQ(g.second.type, b.at(g.first).type);
-    EXPECT_EQ(g.second.radius, b.at(g.first).radius);
-    EXPECT_EQ(g.second.mass, b.at(g.first).mass);
-  }
-}
-
 class Compact : public testing::TestWithParam<Bed> {};
 
 TEST_P(Compact, CullAndRestoreKeepsAllButBitsOfHistories) {

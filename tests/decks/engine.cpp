@@ -1,5 +1,7 @@
 #include "engine.h"
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -137,6 +139,16 @@ double Engine::vector(const std::string& fix, int n) {
 double Engine::variable(const std::string& name) {
   std::string n = name;
   return lmp_->input->variable->compute_equal(lmp_->input->variable->find(&n[0]));
+}
+
+void expect_same_granules(const State& a, const State& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (const auto& g : a) {
+    ASSERT_TRUE(b.count(g.first)) << "granule " << g.first << " was lost";
+    EXPECT_EQ(g.second.type, b.at(g.first).type);
+    EXPECT_EQ(g.second.radius, b.at(g.first).radius);
+    EXPECT_EQ(g.second.mass, b.at(g.first).mass);
+  }
 }
 
 double largest_difference(const State& a, const State& b, Vec Granule::*what) {

@@ -49,6 +49,8 @@ class Engine {
 };
 
 double largest_difference(const State& a, const State& b, Vec Granule::*what);
+/// Expects the same tags, each with its type, radius and mass to the bit.
+void expect_same_granules(const State& a, const State& b);
 double largest(const State& a, Vec Granule::*what);
 
 /// What a bed is made of.
