@@ -31,6 +31,7 @@
 #include "solid_state.h"
 #include "sphere_cells.h"
 #include "stop_watch.h"
+#include "tag_index.h"
 #include "wake_up.h"
 #include "wall_contacts.h"
 #include "worth.h"
@@ -120,9 +121,10 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   struct ActiveBody {
     int number;
     SolidBody* body;
-    bool stands = false;                               // grounded, or all bodies are fixed
-    Vec3 change = Vec3::Zero();                        // of the load on its interface granules since they were locked (N)
-    Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // N and N m about the centre of mass, of the whole body
+    bool stands = false;         // grounded, or all bodies are fixed
+    Vec3 change = Vec3::Zero();  // of the load on its interface granules since they were locked (N)
+    Vec3 force = Vec3::Zero(),
+         torque = Vec3::Zero();  // N and N m about the centre of mass, of the whole body; if it does not stand
     double reach = 0,
            way = 0;  // of its interior granules: farthest from the centre; bound of their way since the last reneighbouring (m)
     int spanning = -1;  // its place among the bodies that span ranks
@@ -209,6 +211,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void look();
   std::vector<char> find_steady(const std::vector<char>& asked);
   void leave_out_what_is_not_steady();
+  bool calm_enough(int i) const;
   void choose_asleep();
   bool find_calm();
   bool can_be_culled(int mask) const;
@@ -250,10 +253,10 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void share_exterior();
   Foreign as_foreign(int i) const;
   bool frame_stands(int frame) const;
+  bool is_clear(int i) const;
   void keep_shell_closed();
   void freeze_contacts();
   void freeze_inner_contacts();
-  void note_fresh(std::int64_t tag, std::int64_t partner, const double* history);
   void freeze_histories();
   void share_bodies();
   void thaw_contacts();
@@ -382,20 +385,21 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
 
   // the change under way
   std::vector<Ball> balls_;
-  FlatMap<int> index_of_;
+  TagIndex index_of_;
   std::vector<std::int64_t> freed_, locked_now_;
   std::vector<Foreign> halo_foreign_;  // other ranks' and periodic images' exterior and interface granules
   std::int64_t stored_everywhere_ = 0;
   std::int64_t locked_everywhere_ = 0;
-  int store_bodies_ = 0;        // bodies on all ranks: with one alone, none can come near another
-  std::size_t stay_near_ = 0;   // interface granules that stayed atoms the last time because something is near
+  int store_bodies_ = 0;            // bodies on all ranks: with one alone, none can come near another
+  bool store_asked_ = false;        // a look saw interface granules that nothing holds any more
+  int builds_without_storing_ = 0;  // since they were last looked for
+  std::size_t stay_near_ = 0;       // interface granules that stayed atoms the last time because something is near
+  int clear_version_ = 0;       // what is stored in frames that stand has come there in other ways than put_away() since the last
   bool shell_changed_ = false;  // by granules that something came near to, or that nothing is near any more
   FlatMap<char> freed_anywhere_, locked_anywhere_;
-  FlatMap<int> ghost_body_;                                            // tag -> key of the body of an interface ghost
-  std::vector<int> freed_keys_;                                        // bodies that wake as a whole, by key, in this change
-  std::vector<std::pair<std::int64_t, std::int64_t>> fresh_contacts_;  // frozen in this change
-  std::vector<double> fresh_histories_;                                // theirs, as the first sees it, world frame
-  std::vector<double> joins_;  // rows (place of a, a, b): resting against another body for long enough
+  FlatMap<int> ghost_body_;      // tag -> key of the body of an interface ghost
+  std::vector<int> freed_keys_;  // bodies that wake as a whole, by key, in this change
+  std::vector<double> joins_;    // rows (place of a, a, b): resting against another body for long enough
   struct Arrival {
     SolidBodies::Place at;
     double mass = 0, radius = 0;
@@ -434,12 +438,13 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::vector<int> motion_words_;  // of a record: what is of no worth once a step has passed
   // lock_step in a compact store, which needs to know no more
   static constexpr std::int64_t locked_long_ago = -1, locked_as_it_was_stored = -2;
-  std::int64_t stored_at_ = -1;    // step in which granules last went into the store
+  std::int64_t stored_at_ = -1;  // step in which granules last went into the store
   bool lists_are_new_ = false;
   bool map_cleared_ = false;
   bool thawed_ = false;
   bool after_setup_ = false;
   bool new_run_ = false;
+  std::size_t unsorted_ = 0;  // granules freed or locked since the engine last sorted its atoms at our wish
   int interface_group_ = -1;
   WorthWatch worth_;
   std::int64_t judged_at_ = -1;     // step of the last judgement
@@ -447,7 +452,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::int64_t restored_then_ = 0;  // granules restored until then
   bool told_no_worth_ = false;
   double energy_then_ = 0;  // kinetic energy of what was exterior when culling began to wait (J); 0: it does not
-  int quick_looks_ = 0;  // left at the start of a run in which nothing is culled yet
+  int quick_looks_ = 0;     // left at the start of a run in which nothing is culled yet
   std::int64_t next_look_ = -1, last_look_ = INT32_MIN;
   std::int64_t membership_version_ = 0;
   double largest_excess_ = 0;

@@ -108,14 +108,15 @@ void FixSolidCull::take_loads() {
     const int i = locked_index_[k];
     ShellEntry& e = shell_[i];
     const Vec3 in_world = vec(force[i]);
-    if (moves) add_to_body(k, in_world - atom->rmass[i] * g, atom->torque[i]);
-    const Vec3 load = active_[locked_slot_[k]].body->pose.turned_to_frame(in_world);
+    ActiveBody& a = active_[locked_slot_[k]];
+    if (moves && !a.stands) add_to_body(k, in_world - atom->rmass[i] * g, atom->torque[i]);
+    const Vec3 load = a.body->pose.turned_to_frame(in_world);
     if (e.fresh) {
       e.reference = load - e.load_change;
       e.fresh = false;
     }
     e.load_change = load - e.reference;
-    if (active_[locked_slot_[k]].stands) active_[locked_slot_[k]].change += e.load_change;
+    if (a.stands) a.change += e.load_change;
     const double tolerance = wake_up_.tolerance(atom->rmass[i], e.normal_load);
     const double square = e.load_change.squaredNorm();
     if (square > e.excess * e.excess * tolerance * tolerance) e.excess = std::sqrt(square) / tolerance;
@@ -391,6 +392,8 @@ void FixSolidCull::adopt_places() {
     const bool same = from == to;
     const Eigen::Matrix3d turn = to.turn().transpose() * from.turn();
     if (compact() && !same) turn_inner_histories(gone.first, turn);
+    if (store_->holds(gone.first) && store_->frame_of(gone.first) != GranuleStore::shared_frame)
+      ++clear_version_;  // its granules may stand from now on
     store_->merge(gone.first, body, [&](StoredGranule& g) {
       if (same) return;
       g.position = to.to_frame(from.to_world(g.position));

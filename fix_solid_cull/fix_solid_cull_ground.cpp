@@ -36,6 +36,7 @@ void FixSolidCull::set_grounded(int body, bool on) {
   SolidBody& b = bodies_.body(body);
   if (b.grounded == on) return;
   b.grounded = on;
+  if (on && store_->holds(body)) ++clear_version_;
   b.changed = true;
   b.step_then = -1;
   b.acceleration = Vec3::Zero();
@@ -116,7 +117,8 @@ void FixSolidCull::ground_bodies() {
   std::size_t may_go = 0;
   for (const int i : locked_index_) may_go += may_leave_its_walls(shell_[i]);
   const double gain = static_cast<double>(may_go) - static_cast<double>(stay_near_);
-  if (any_rank(!lifting_.empty() || gain > std::max(worth_of_a_build * atom->nlocal, 10.0))) ask_for_build(update->ntimestep + 1);
+  store_asked_ = gain > std::max(worth_of_a_build * atom->nlocal, 10.0);
+  if (any_rank(!lifting_.empty() || store_asked_)) ask_for_build(update->ntimestep + 1);
 }
 
 void FixSolidCull::share_out_loads() {

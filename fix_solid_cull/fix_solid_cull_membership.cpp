@@ -27,10 +27,17 @@ namespace {
 
 // a shell granule goes to the store when nothing exterior is within this many skins; it is fetched at one skin (no flapping)
 constexpr double store_gap_in_skins = 2.5;
+// an exterior granule that nothing stored was so near to need not be looked at again until it has moved by this many skins: it
+// may have gone as far the other way when the last went to the store, so twice this and one skin is the gap
+constexpr double clear_way_in_skins = 0.75;
+// so many moving frames are compared with a granule one by one, more as one box
+constexpr std::size_t few_frames = 8;
 // after this share of the atoms came or went, the engine sorts its arrays at once
 constexpr double sort_share = 0.05;
 // interface granules that nothing is near any more go to the store when they are this share of the atoms, or when more changes
 constexpr double store_share = 0.05;
+// they are looked for so often, and when something was locked
+constexpr int builds_between_storing = 4;
 
 // walls are looked at again when a body has moved by this many skins; what is nearer than that and a margin becomes an atom
 constexpr double wall_check_in_skins = 0.25;
@@ -105,9 +112,10 @@ bool FixSolidCull::in_ball(const Vec3& x, double margin) const {
 }
 
 void FixSolidCull::index_atoms() {
-  index_of_.clear();
-  index_of_.reserve(static_cast<std::size_t>(atom->nlocal));
-  for (int i = 0; i < atom->nlocal; ++i) index_of_[atom->tag[i]] = i;
+  int highest = 0;
+  for (int i = 0; i < atom->nlocal; ++i) highest = std::max(highest, atom->tag[i]);
+  index_of_.begin(static_cast<std::size_t>(atom->nlocal), highest);
+  for (int i = 0; i < atom->nlocal; ++i) index_of_.set(atom->tag[i], i);
 }
 
 void FixSolidCull::change_membership() {
@@ -282,6 +290,7 @@ void FixSolidCull::unlock(int i) {
   ShellEntry& e = shell_[i];
   e.locked = false;
   e.fresh = false;
+  e.clear_in = -1;
   e.excess = 0;
   e.calm = 0;
   e.waited = 0;
@@ -422,7 +431,7 @@ int FixSolidCull::bring_back(std::int64_t tag) {
   set(atom->omega[i], body.twist.spin);
   e.registered = true;  // the implicit surface does not care who holds a granule
   e.registered_at = observer_.to_frame(x);
-  index_of_[tag] = i;
+  index_of_.set(tag, i);
   return i;
 }
 
@@ -455,7 +464,6 @@ void FixSolidCull::put_away(int i) {
   g.held = e.held;
   if (compact()) {
     g = GranuleStore::rounded(g);
-    if (settings_.tolerance_relative == 0) g.normal_load = 0;  // nothing asks for it
     g.lock_step = e.lock_step == update->ntimestep ? locked_as_it_was_stored : locked_long_ago;
   }
   if (e.walls > 0) wall_loads_.add(g.tag, g.body, mesh_loads_.of(g.tag));
@@ -472,7 +480,7 @@ void FixSolidCull::put_away(int i) {
   largest = std::max(largest, g.radius);
   index_of_.erase(g.tag);
   records_.remove(i);
-  if (i < atom->nlocal) index_of_[atom->tag[i]] = i;
+  if (i < atom->nlocal) index_of_.set(atom->tag[i], i);
 }
 
 void FixSolidCull::free_what_wakes(bool all) {
@@ -566,9 +574,16 @@ FixSolidCull::Foreign FixSolidCull::as_foreign(int i) const {
 
 bool FixSolidCull::frame_stands(int frame) const { return frame == GranuleStore::shared_frame || stands_still(frame); }
 
+/// Nothing that is stored in a frame that stands was within store_gap_in_skins of it when it was last looked at; since then it
+/// has hardly moved, and only what is as far from all exterior granules went to the store.
+bool FixSolidCull::is_clear(int i) const {
+  const double way = clear_way_in_skins * neighbor->skin;
+  return shell_[i].clear_in == clear_version_ && (vec(atom->x[i]) - shell_[i].clear_at).squaredNorm() < way * way;
+}
+
 void FixSolidCull::keep_shell_closed() {
   const auto timed = watch_.time(Part::shell);
-  const double gap = neighbor->skin;
+  const double skin = neighbor->skin, gap = store_gap_in_skins * skin;
   std::set<std::int64_t> near;
   struct Frame {
     int number, own;
@@ -577,16 +592,20 @@ void FixSolidCull::keep_shell_closed() {
     Vec3 middle, half;  // of a box around its stored granules, in the world
   };
   std::vector<Frame> frames;
-  bool some_move = false;  // of the bodies that have stored granules
+  std::vector<Frame> moving;
+  Vec3 moving_lo = Vec3::Constant(HUGE_VAL), moving_hi = -moving_lo;  // around all of them
   Vec3 lo = Vec3::Constant(HUGE_VAL), hi = -lo;
   store_->for_each_frame([&](int frame, const Vec3& own_lo, const Vec3& own_hi) {
     const Pose& pose = pose_of_frame(frame);
     const Vec3 half = turned_half_box(pose.turn(), 0.5 * (own_hi - own_lo)) + Vec3::Constant(store_->largest_radius() + gap);
     frames.push_back({frame, frame == GranuleStore::shared_frame ? -1 : key_of(frame), frame_stands(frame), &pose,
                       pose.to_world(0.5 * (own_lo + own_hi)), half});
-    some_move = some_move || !frames.back().stands;
     lo = lo.cwiseMin(frames.back().middle - half);
     hi = hi.cwiseMax(frames.back().middle + half);
+    if (frames.back().stands) return;
+    moving.push_back(frames.back());
+    moving_lo = moving_lo.cwiseMin(frames.back().middle - half);
+    moving_hi = moving_hi.cwiseMax(frames.back().middle + half);
   });
   const auto far_from_all = [&](const Vec3& x, double radius) {
     for (const Vec3& shift : halo_.image_shifts())
@@ -594,28 +613,59 @@ void FixSolidCull::keep_shell_closed() {
     return true;
   };
   // exterior granules, and the shells of other bodies
-  std::vector<Foreign> visitors;
+  struct Visitor {
+    Foreign who;
+    int atom;    // an exterior granule of this rank, else -1
+    bool clear;  // of what is stored in frames that stand
+  };
+  std::vector<Visitor> visitors;
   std::vector<Sphere> places;
-  const auto comes = [&](const Foreign& v) {
-    if (v.stands && !some_move) return;
+  const auto near_moving = [&](const Sphere& s) {
+    if (moving.empty()) return false;
+    for (const Vec3& shift : halo_.image_shifts()) {
+      const Vec3 x = s.centre + shift;
+      if ((x.array() < moving_lo.array() - s.radius).any() || (x.array() > moving_hi.array() + s.radius).any()) continue;
+      if (moving.size() > few_frames) return true;
+      for (const Frame& f : moving)
+        if (((x - f.middle).array().abs() <= f.half.array() + s.radius).all()) return true;
+    }
+    return false;
+  };
+  const auto comes = [&](const Visitor& v) {
+    if ((v.who.stands || v.clear) && !near_moving(v.who.sphere)) return;
     visitors.push_back(v);
-    places.push_back(v.sphere);
+    places.push_back(v.who.sphere);
   };
   for (const Foreign& v : halo_foreign_)
-    if (!far_from_all(v.sphere.centre, v.sphere.radius)) comes(v);
-  for (int i = 0; i < atom->nlocal; ++i)
-    if ((!shell_[i].locked || store_bodies_ > 1) && !far_from_all(vec(atom->x[i]), atom->radius[i])) comes(as_foreign(i));
+    if (!far_from_all(v.sphere.centre, v.sphere.radius)) comes({v, -1, false});
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const ShellEntry& e = shell_[i];
+    const bool clear = !e.locked && is_clear(i);
+    if ((e.locked && store_bodies_ <= 1) || (clear && moving.empty()) || far_from_all(vec(atom->x[i]), atom->radius[i])) continue;
+    const Foreign who = as_foreign(i);
+    comes({who, e.locked ? -1 : i, clear});
+  }
   SphereCells cells;
   cells.build(std::move(places), 2 * diameter_ + gap);
   for (const Frame& f : frames) {
     const Vec3 half = f.half + Vec3::Constant(cells.largest_radius());
     for (const Vec3& shift : halo_.image_shifts())
-      cells.for_each_in_box(f.middle - half - shift, f.middle + half - shift, [&](std::size_t v, const Sphere& s) {
-        if (visitors[v].body != f.own && !(f.stands && visitors[v].stands))
-          store_->for_each_near(f.number, {f.pose->to_frame(s.centre + shift), s.radius}, gap,
-                                [&](const Resident& g) { near.insert(g.tag); });
+      cells.for_each_in_box(f.middle - half - shift, f.middle + half - shift, [&](std::size_t k, const Sphere& s) {
+        Visitor& v = visitors[k];
+        if (v.who.body == f.own || (f.stands && (v.who.stands || v.clear))) return true;
+        const Vec3 at = f.pose->to_frame(s.centre + shift);
+        store_->for_each_near(f.number, {at, s.radius}, gap, [&](const Resident& g) {
+          const double reach = s.radius + g.radius + skin;
+          if ((g.position - at).squaredNorm() < reach * reach) near.insert(g.tag);
+          if (f.stands) v.atom = -1;
+        });
         return true;
       });
+  }
+  for (const Visitor& v : visitors) {
+    if (v.atom < 0 || v.clear) continue;
+    shell_[v.atom].clear_at = v.who.sphere.centre;
+    shell_[v.atom].clear_in = clear_version_;
   }
   fetch_near_walls(near);
   if (open_for_insertion_)
@@ -790,17 +840,21 @@ void FixSolidCull::freeze_contacts() {
     if (const int* j = index_of_.find(partner))
       shell_[i].reference -= bodies_.pose(shell_[i].body).turned_to_frame(pair_force_.on_first(i, *j, history));
   };
-  fresh_contacts_.clear();
-  fresh_histories_.clear();
+  const auto just_locked = [&](int i) {
+    const ShellEntry& e = shell_[i];
+    return e.locked && e.lock_step == update->ntimestep && e.came_back != update->ntimestep;
+  };
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!shell_[i].locked) continue;
     const std::int64_t tag = atom->tag[i];
     histories_.for_each_partner(i, [&](int partner, const double* history) {
-      if (!freezes(tag, partner)) return;
-      if (!contacts_.contains(tag, partner)) {
-        contacts_.add(tag, partner, nullptr);
-        if (contacts_.width()) note_fresh(tag, partner, history);
+      const int* j = index_of_.find(partner);
+      if (j && just_locked(i) && just_locked(*j)) {  // most are: seen from both sides, and without contacts until now
+        if (i < *j) contacts_.add_unturned(tag, partner, history);
+        return;
       }
+      if (!freezes(tag, partner)) return;
+      if (!contacts_.contains(tag, partner)) contacts_.add_unturned(tag, partner, history);
       rebase(i, partner, history);
     });
   }
@@ -833,8 +887,7 @@ void FixSolidCull::freeze_inner_contacts() {
       const int* ghost = j ? nullptr : ghost_body_.find(partner);
       const int other = j ? (shell_[*j].locked ? key_of(shell_[*j].body) : 0) : ghost ? *ghost : 0;
       if (other != own || contacts_.contains(tag, partner)) return;
-      contacts_.add(tag, partner, nullptr);
-      note_fresh(tag, partner, history);
+      contacts_.add_unturned(tag, partner, history);
       for (const int* end : {static_cast<const int*>(&i), j})
         if (end && !shell_[*end].fresh && j)
           shell_[*end].reference -=
@@ -857,23 +910,12 @@ void FixSolidCull::share_bodies() {
     ghost_body_[static_cast<std::int64_t>(rows[r + 3])] = static_cast<int>(rows[r + 4]);
 }
 
-void FixSolidCull::note_fresh(std::int64_t tag, std::int64_t partner, const double* history) {
-  fresh_contacts_.push_back({tag, partner});
-  fresh_histories_.insert(fresh_histories_.end(), history, history + contacts_.width());
-}
-
 void FixSolidCull::freeze_histories() {
   // now that each granule has its body: vectors wait in the body's frame
-  const std::size_t width = contacts_.width();
-  double* history = fresh_histories_.data();
-  for (const auto& [tag, partner] : fresh_contacts_) {
-    const int body = bodies_.body_of(tag) ? bodies_.body_of(tag) : bodies_.body_of(partner);
-    contacts_.turn(history, bodies_.pose(body).turn().transpose());
-    contacts_.add(tag, partner, history);
-    history += width;
-  }
-  fresh_histories_ = std::vector<double>();
-  fresh_contacts_.clear();
+  contacts_.turn_all_unturned([&](std::int64_t low, std::int64_t high) -> Eigen::Matrix3d {
+    const int body = bodies_.body_of(low);
+    return bodies_.pose(body ? body : bodies_.body_of(high)).turn().transpose();
+  });
 }
 
 void FixSolidCull::thaw_contacts() {
@@ -928,6 +970,11 @@ bool FixSolidCull::may_leave_its_walls(const ShellEntry& e) const {
 }
 
 void FixSolidCull::store_what_is_deep(bool change) {
+  // shells that nothing is near any more go now and then; what was just locked, and what the looks ask for, at once
+  const bool asked = any_rank(!locked_now_.empty() || store_asked_);
+  store_asked_ = false;
+  if (!asked && (!sleeping() || ++builds_without_storing_ < builds_between_storing)) return;
+  builds_without_storing_ = 0;
   std::int64_t highest = 0, highest_anywhere = 0;
   for (int i = 0; i < atom->nlocal; ++i) highest = std::max<std::int64_t>(highest, atom->tag[i]);
   MPI_Allreduce(&highest, &highest_anywhere, 1, MPI_INT64_T, MPI_MAX, world);
@@ -1027,7 +1074,7 @@ void FixSolidCull::fit_memory() {
   pair_force_.release();
   const auto empty = [](auto&... scratch) { ((scratch = {}), ...); };
   empty(chosen_, side_changes_, touches_, joins_, freed_, locked_now_, freed_anywhere_, locked_anywhere_, overdue_, index_of_,
-        locked_index_, locked_slot_, locked_place_, riding_, fresh_contacts_, around_);
+        locked_index_, locked_slot_, locked_place_, riding_, around_);
   shell_.resize(atom->nmax);
   shell_.shrink_to_fit();
   index_atoms();
@@ -1045,8 +1092,11 @@ void FixSolidCull::publish_atom_counts() {
     atom->map_set();
     map_cleared_ = false;
   }
-  const double moved = static_cast<double>(freed_.size() + locked_now_.size());
-  if (any_rank(moved > sort_share * atom->nlocal) && atom->sortfreq > 0) atom->nextsort = update->ntimestep;
+  unsorted_ += freed_.size() + locked_now_.size();
+  if (atom->sortfreq > 0 && any_rank(static_cast<double>(unsorted_) > sort_share * atom->nlocal)) {
+    atom->nextsort = update->ntimestep;
+    unsorted_ = 0;
+  }
   ++membership_version_;
   label_bodies();
 }

@@ -239,6 +239,7 @@ bool FixSolidCull::is_mine(const Block& b) const {
 }
 
 void FixSolidCull::take_up_as_it_was(const Block& b) {
+  ++clear_version_;
   observer_ = b.observer;
   observed_then_ = b.observed_then;
   std::vector<int> number;
@@ -270,6 +271,7 @@ void FixSolidCull::take_up_as_it_was(const Block& b) {
 /// Each rank takes the granules whose places it owns, with the motion that they have in their bodies, and ties them together
 /// anew.
 void FixSolidCull::take_up(const std::vector<Block>& blocks) {
+  ++clear_version_;
   struct Taken {
     const Block* block;
     const Block::Granule* granule;
@@ -283,8 +285,6 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
       if (!bodies_.body_of(tag) && (here || halo_.owns(b.bodies[g.body].pose.to_world(g.place))))
         taken.emplace(tag, Taken{&b, &g});
     }
-  fresh_contacts_.clear();
-  fresh_histories_.clear();
   const auto ours = [&](std::int64_t tag) { return taken.count(tag) || bodies_.body_of(tag); };
   for (const Block& b : blocks)
     for (const Block::Edge& e : b.edges) {
@@ -295,8 +295,7 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
       }
       std::vector<double> history = e.history;
       contacts_.turn(history.data(), b.bodies[e.body].pose.turn());
-      contacts_.add(e.low, e.high, nullptr);
-      note_fresh(e.low, e.high, history.data());
+      contacts_.add_unturned(e.low, e.high, history.data());
     }
   for (const auto& [tag, t] : taken) {
     const SolidBody& from = t.block->bodies[t.granule->body];
@@ -440,11 +439,9 @@ void FixSolidCull::write_restart(FILE* file) {
   if (store_) store_->for_each([&](const Resident& g) { tags.push_back(g.tag); });
   std::sort(tags.begin(), tags.end());
   std::vector<std::int64_t> atoms;
-  index_of_.clear();
-  for (int i = 0; i < atom->nlocal; ++i) {
-    index_of_[atom->tag[i]] = i;
+  index_atoms();
+  for (int i = 0; i < atom->nlocal; ++i)
     if (shell_[i].locked) atoms.push_back(atom->tag[i]);
-  }
   const std::vector<double> mine = store_ ? serialise(tags, atoms, true) : std::vector<double>();
 
   std::array<double, 4> counters = ledger_.counters();

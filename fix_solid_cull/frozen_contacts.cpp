@@ -39,42 +39,55 @@ void FrozenContacts::write(std::uint32_t e, std::int64_t tag, const double* hist
   for (std::size_t d = 0; d < width(); ++d) to[d] = turned && flips_[d] ? -history[d] : history[d];
 }
 
+std::uint32_t FrozenContacts::link(std::int64_t tag, std::int64_t partner) {
+  const std::int32_t low = narrow_tag(std::min(tag, partner)), high = narrow_tag(std::max(tag, partner));
+  std::uint32_t e = first_free_;
+  if (e == none) {
+    if (edges_.size() >= none) throw std::logic_error("more than 2^31 - 1 frozen contacts on one rank");
+    e = static_cast<std::uint32_t>(edges_.append());
+    if (width()) histories_.append();
+  } else {
+    first_free_ = edges_[e].next_low;
+  }
+  edges_[e].low = low;
+  edges_[e].high = high;
+  edges_[e].has_history = false;
+  for (const std::int32_t end : {low, high}) {
+    std::uint32_t& head = heads_[end];
+    set_next(e, end, head == 0 ? none : head - 1);
+    head = e + 1;
+  }
+  ++count_;
+  return e;
+}
+
 void FrozenContacts::add(std::int64_t tag, std::int64_t partner, const double* history) {
   if (tag == partner) return;  // a granule that touches its own periodic image: no partner to freeze it with
-  std::uint32_t e = find(tag, partner);
-  if (e == none) {
-    const std::int32_t low = narrow_tag(std::min(tag, partner)), high = narrow_tag(std::max(tag, partner));
-    if (first_free_ == none) {
-      if (edges_.size() >= none) throw std::logic_error("more than 2^31 - 1 frozen contacts on one rank");
-      e = static_cast<std::uint32_t>(edges_.append());
-      if (width()) histories_.append();
-    } else {
-      e = first_free_;
-      first_free_ = edges_[e].next_low;
-    }
-    edges_[e].low = low;
-    edges_[e].high = high;
-    for (const std::int32_t end : {low, high}) {
-      set_next(e, end, first(end));
-      heads_[end] = e;
-    }
-    ++count_;
-  }
+  const std::uint32_t known = find(tag, partner), e = known == none ? link(tag, partner) : known;
   write(e, tag, history);
+}
+
+void FrozenContacts::add_unturned(std::int64_t tag, std::int64_t partner, const double* history) {
+  if (tag == partner) return;
+  const std::uint32_t e = link(tag, partner);
+  if (width() == 0) return;
+  write(e, tag, history);
+  edges_[e].has_history = false;
+  unturned_.push_back(e);
 }
 
 void FrozenContacts::unlink(std::uint32_t e, std::int64_t tag) {
   const auto key = static_cast<std::int32_t>(tag);
   std::uint32_t* head = heads_.find(key);
   const std::uint32_t after = next(e, tag);
-  if (*head == e) {
+  if (*head == e + 1) {
     if (after == none)
       heads_.erase(key);
     else
-      *head = after;
+      *head = after + 1;
     return;
   }
-  std::uint32_t before = *head;
+  std::uint32_t before = *head - 1;
   while (next(before, tag) != e) before = next(before, tag);
   set_next(before, tag, after);
 }

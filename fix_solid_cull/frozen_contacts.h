@@ -35,6 +35,19 @@ class FrozenContacts {
   /// history). A contact that is there already keeps its place and takes the new history.
   void add(std::int64_t tag, std::int64_t partner, const double* history);
 
+  /// The same for a contact that is not there yet, whose history is still that in the world: it has none until
+  /// turn_all_unturned(), before which nothing may be removed.
+  void add_unturned(std::int64_t tag, std::int64_t partner, const double* history);
+  /// into_body(low tag, high tag): the rotation from the world to the frame in which the contact's history waits.
+  template <class IntoBody>
+  void turn_all_unturned(IntoBody into_body) {
+    for (const std::uint32_t e : unturned_) {
+      turn(histories_.row(e), into_body(edges_[e].low, edges_[e].high));
+      edges_[e].has_history = true;
+    }
+    unturned_ = std::vector<std::uint32_t>();
+  }
+
   /// Calls visit(partner, history as `tag` sees it or nullptr) for each contact of `tag`.
   template <class Visit>
   void for_each(std::int64_t tag, Visit visit) const {
@@ -130,7 +143,7 @@ class FrozenContacts {
 
   std::uint32_t first(std::int64_t tag) const {
     const std::uint32_t* head = heads_.find(narrow_tag(tag));
-    return head ? *head : none;
+    return head ? *head - 1 : none;
   }
   std::int64_t other(std::uint32_t e, std::int64_t tag) const { return edges_[e].low == tag ? edges_[e].high : edges_[e].low; }
   std::uint32_t next(std::uint32_t e, std::int64_t tag) const {
@@ -143,6 +156,7 @@ class FrozenContacts {
       edges_[e].next_high = next & none;
   }
   std::uint32_t find(std::int64_t tag, std::int64_t partner) const;
+  std::uint32_t link(std::int64_t tag, std::int64_t partner);
   void unlink(std::uint32_t e, std::int64_t tag);
   void remove(std::uint32_t e);
   const double* read(std::uint32_t e, std::int64_t tag, double* out) const;
@@ -153,7 +167,8 @@ class FrozenContacts {
   ChunkedArray<Edge> edges_;
   ChunkedArray<double> histories_{0};  // a row for each edge, as the low tag sees it
   std::uint32_t first_free_ = none;
-  FlatMap<std::uint32_t, std::int32_t> heads_;
+  FlatMap<std::uint32_t, std::int32_t> heads_;  // tag -> its first edge, counted from 1
+  std::vector<std::uint32_t> unturned_;
   std::size_t count_ = 0;
   Elsewhere elsewhere_;
 };

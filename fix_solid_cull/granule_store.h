@@ -73,8 +73,8 @@ class GranuleStore {
   /// Some words more, none at first; they go with it and are lost when it is taken out. Likewise.
   void tail(std::int64_t tag, std::vector<std::uint64_t>& out) const;
   void set_tail(std::int64_t tag, const std::vector<std::uint64_t>& tail);
-  bool transient_known(std::int64_t tag) const;                   ///< it has transient words that are not forgotten yet
-  void forget_transient() { transient_ = Transient(); }           ///< costs what was added since the last call
+  bool transient_known(std::int64_t tag) const;          ///< it has transient words that are not forgotten yet
+  void forget_transient() { transient_ = Transient(); }  ///< costs what was added since the last call
 
   /// The granule belongs to another body now, at this place in that body's frame.
   void move(std::int64_t tag, int body, const Vec3& position);
@@ -100,6 +100,11 @@ class GranuleStore {
   /// What share() said of the body is forgotten: now, or once it has no granules.
   void forget(int body);
   int frame_of(int body) const;
+  /// Whether it has granules here.
+  bool holds(int body) const {
+    const auto found = bodies_.find(body);
+    return found != bodies_.end() && found->second.granules > 0;
+  }
 
   std::size_t size() const { return size_; }
   double mass() const { return mass_.value(); }              ///< kg; a running sum, compensated

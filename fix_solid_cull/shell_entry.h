@@ -15,15 +15,15 @@ struct ShellEntry {
   bool locked = false;
   bool fresh = false;               ///< the reference load is taken in this step
   int body = 0;                     ///< the body in whose frame it stands, on this rank
-  Vec3 place = Vec3::Zero();        ///< in the body's frame (m)
+  Vec3 place = Vec3::Zero();        ///< in the body's frame (m).
   Vec3 reference = Vec3::Zero();    ///< F_ext at locking, re-based when contacts change sides; frame of the body (N). Of an
                                     ///< exterior granule: acceleration of what it touched when calm began (m/s^2)
   Vec3 load_change = Vec3::Zero();  ///< F_ext - reference at the last step; frame of the body (N)
   static constexpr double not_known = -1;
-  double normal_load = not_known;   ///< sum of normal contact forces at locking (N). Of an exterior granule: at the last look
-  double excess = 0;                ///< largest load change over tolerance since the last wake-up
-  std::int64_t lock_step = -1;      ///< of an exterior granule: when calm began
-  bool held = false;                ///< touched a wall that stands still when it was locked
+  double normal_load = not_known;  ///< sum of normal contact forces at locking (N). Of an exterior granule: at the last look
+  double excess = 0;               ///< largest load change over tolerance since the last wake-up
+  std::int64_t lock_step = -1;     ///< of an exterior granule: when calm began
+  bool held = false;               ///< touched a wall that stands still when it was locked
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< at locking, given back only if no step has passed. Of an exterior
                                                       ///< granule: its velocity when calm began
 
@@ -36,9 +36,11 @@ struct ShellEntry {
   std::int64_t came_back = -1;   ///< step in which it came out of the store
 
   // exterior granules
-  int calm = 0;             ///< looks in a row in solid state; of an interface granule: at rest against another body
-  int waited = 0;           ///< looks since it could have been culled
-  bool registered = false;  ///< known to the implicit surface
+  int clear_in = -1;             ///< version of the store in which nothing stored was near
+  Vec3 clear_at = Vec3::Zero();  ///< where it was then (m)
+  int calm = 0;                  ///< looks in a row in solid state; of an interface granule: at rest against another body
+  int waited = 0;                ///< looks since it could have been culled
+  bool registered = false;       ///< known to the implicit surface
   Vec3 registered_at = Vec3::Zero();
   Voxel nearest_void = Voxel::nothing();
 

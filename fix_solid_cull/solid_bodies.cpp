@@ -175,6 +175,7 @@ SolidBodies::Place SolidBodies::lock(std::int64_t tag, const MovingGranule& gran
   contacts.for_each_partner(tag, [&](std::int64_t partner) {
     const int theirs = body_of(partner);
     if (!theirs) return;
+    if (number == theirs && (periods_.array() == 0).all()) return;
     const Vec3 there = bodies_[theirs].pose.to_world(mass_of(partner).position);
     if (!number) {
       position -= to_image_of(there - position);

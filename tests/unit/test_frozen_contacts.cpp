@@ -382,5 +382,38 @@ TEST(FrozenContacts, does_as_a_map_of_pairs_does_under_random_operations) {
   }
 }
 
+TEST(FrozenContacts, an_unturned_history_is_none_until_all_are_turned) {
+  FrozenContacts contacts = with_layout({true, true, true, false});
+  contacts.set_vectors({0});
+  const double h[] = {1, 2, 3, 4}, k[] = {-5, 6, 7, 8};
+  contacts.add(1, 2, k);
+  contacts.add_unturned(7, 3, h);  // as the higher one sees it
+  contacts.add_unturned(1, 7, k);
+  EXPECT_EQ(contacts.size(), 3u);
+  EXPECT_TRUE(contacts.contains(3, 7));
+  EXPECT_EQ(seen_by(contacts, 7).at(3), History());
+  contacts.turn(7, Eigen::Matrix3d(2 * Eigen::Matrix3d::Identity()), [](std::int64_t) { return true; });  // waits in the world
+  const Eigen::Matrix3d by = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()).toRotationMatrix();
+  std::set<Pair> asked;
+  contacts.turn_all_unturned([&](std::int64_t low, std::int64_t high) {
+    asked.insert({low, high});
+    return low == 3 ? by : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+  });
+  EXPECT_EQ(asked, (std::set<Pair>{{3, 7}, {1, 7}}));
+  const History seen = seen_by(contacts, 7).at(3);  // (1, 2, 3) turned by a right angle about z
+  ASSERT_EQ(seen.size(), 4u);
+  EXPECT_NEAR(seen[0], -2, 1e-12);
+  EXPECT_NEAR(seen[1], 1, 1e-12);
+  EXPECT_NEAR(seen[2], 3, 1e-12);
+  EXPECT_EQ(seen[3], 4);
+  EXPECT_EQ(seen_by(contacts, 1).at(7), History(k, k + 4));
+  EXPECT_EQ(seen_by(contacts, 1).at(2), History(k, k + 4));
+  contacts.turn_all_unturned(
+      [&](std::int64_t, std::int64_t) { return Eigen::Matrix3d(Eigen::Matrix3d::Zero()); });  // none is left
+  EXPECT_EQ(seen_by(contacts, 1).at(7), History(k, k + 4));
+  contacts.erase(7);
+  EXPECT_EQ(contacts.size(), 1u);
+}
+
 }  // namespace
 }  // namespace solidcull
