@@ -255,6 +255,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   bool frame_stands(int frame) const;
   bool is_clear(int i) const;
   void keep_shell_closed();
+  bool just_locked(int i) const;
   void freeze_contacts();
   void freeze_inner_contacts();
   void freeze_histories();

@@ -471,6 +471,12 @@ void FixSolidCull::leave_out_what_is_not_steady() {
   chosen_.erase(std::remove_if(chosen_.begin(), chosen_.end(), left_out), chosen_.end());
 }
 
+/// Calm for as many looks as what presses on it asks for.
+bool FixSolidCull::calm_enough(int i) const {
+  const double patience = looks_quickly() ? 1 : SolidStateLaw::patience(atom->rmass[i] * weight_scale_, shell_[i].normal_load);
+  return shell_[i].calm >= patience * looks_in_a_row();
+}
+
 void FixSolidCull::choose_asleep() {
   // whoever is in solid state sleeps, but for a cover around what is not
   overdue_.clear();
@@ -480,7 +486,7 @@ void FixSolidCull::choose_asleep() {
     std::vector<Sphere> spheres;
     std::vector<double> rows;
     for (int i = 0; i < atom->nlocal; ++i) {
-      if (shell_[i].locked || shell_[i].calm >= looks_in_a_row()) continue;
+      if (shell_[i].locked || calm_enough(i)) continue;
       const Sphere s = sphere(i);
       spheres.push_back(s);
       rows.insert(rows.end(), {s.centre[0], s.centre[1], s.centre[2], s.radius});
@@ -493,7 +499,7 @@ void FixSolidCull::choose_asleep() {
   for (int i = 0; i < atom->nlocal; ++i) {
     ShellEntry& e = shell_[i];
     if (e.locked) continue;
-    if (e.calm < looks_in_a_row() || (cover > 0 && awake.any_near(sphere(i), cover))) {
+    if (!calm_enough(i) || (cover > 0 && awake.any_near(sphere(i), cover))) {
       e.waited = 0;
       continue;
     }

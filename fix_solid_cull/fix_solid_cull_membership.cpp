@@ -816,6 +816,12 @@ void FixSolidCull::split_bodies() {
     if (bodies_.bodies().count(body)) find_frame(body);
 }
 
+/// In this change, and not before it in the same step.
+bool FixSolidCull::just_locked(int i) const {
+  const ShellEntry& e = shell_[i];
+  return e.locked && e.lock_step == update->ntimestep && e.came_back != update->ntimestep;
+}
+
 void FixSolidCull::freeze_contacts() {
   // a contact between two granules of one body is left out of the engine's lists from here on
   const auto is_locked = [&](std::int64_t tag) {
@@ -839,10 +845,6 @@ void FixSolidCull::freeze_contacts() {
     if (shell_[i].fresh) return;
     if (const int* j = index_of_.find(partner))
       shell_[i].reference -= bodies_.pose(shell_[i].body).turned_to_frame(pair_force_.on_first(i, *j, history));
-  };
-  const auto just_locked = [&](int i) {
-    const ShellEntry& e = shell_[i];
-    return e.locked && e.lock_step == update->ntimestep && e.came_back != update->ntimestep;
   };
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!shell_[i].locked) continue;
@@ -884,6 +886,7 @@ void FixSolidCull::freeze_inner_contacts() {
     const int own = key_of(shell_[i].body);
     histories_.for_each_partner(i, [&](int partner, const double* history) {
       const int* j = index_of_.find(partner);
+      if (j && just_locked(i) && just_locked(*j)) return;  // freeze_contacts() has seen to it
       const int* ghost = j ? nullptr : ghost_body_.find(partner);
       const int other = j ? (shell_[*j].locked ? key_of(shell_[*j].body) : 0) : ghost ? *ghost : 0;
       if (other != own || contacts_.contains(tag, partner)) return;

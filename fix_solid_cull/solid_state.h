@@ -1,6 +1,9 @@
 // Solid state: a granule and its neighbours move as one rigid piece, in force balance, for long enough (DESIGN section 5).
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+
 #include "sphere.h"
 
 namespace solidcull {
@@ -24,6 +27,16 @@ struct SolidStateLaw {
   static constexpr double gap = 0.01;                   ///< touching within this share of the radii's sum counts as contact
   static constexpr double drift_share = 0.05;           ///< of `speed`, for granules without a loaded contact
   static constexpr double out_of_balance_share = 0.25;  ///< of the wake-up tolerance A
+
+  /// How many times as long a granule must be calm for what its contacts press with (normal_load; below 0: not known). What
+  /// presses on granules sets the time in which they change places, d (density / pressure)^(1/2), the time in the inertial
+  /// number of dense flow: one at a surface, with little above it, takes longer to show that it still creeps. Forces in the
+  /// same unit.
+  static double patience(double weight, double normal_load) {
+    constexpr double confined = 3, longest = 2;  // normal load in weights beyond which no more time is needed
+    if (normal_load < 0 || normal_load >= confined * weight) return 1;
+    return normal_load == 0 ? longest : std::min(longest, std::sqrt(confined * weight / normal_load));
+  }
 
   bool quiet_contact(const MovingSphere& a, const MovingSphere& b) const {
     return contact_velocity(a, b).squaredNorm() < speed * speed;

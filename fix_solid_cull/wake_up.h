@@ -1,13 +1,15 @@
 // When an interface granule wakes, and how much of the body it takes along (DESIGN section 8).
 #pragma once
 
+#include <algorithm>
+
 #include "sphere.h"
 
 namespace solidcull {
 
 /// The error control: an absolute and a relative tolerance, as in an ODE solver.
 struct WakeUpLaw {
-  double absolute;                       ///< A, in granule weights
+  double absolute;                       ///< A, in granule weights: at most
   double relative;                       ///< R, in normal loads at locking
   double gravity;                        ///< |g| in m/s^2
   double carve_radius;                   ///< r0 in m
@@ -17,8 +19,16 @@ struct WakeUpLaw {
                           size_share = 1.0 / 12;  ///< for A = 1: 2.5 % and 25 % at the default tolerance
   static constexpr double small_body = 300;       ///< granules: below, the shares grow, tenfold at most
 
-  /// Largest load change (N) that a granule of this mass (kg) and normal load at locking (N) sleeps through.
-  double tolerance(double mass, double normal_load) const { return absolute * mass * gravity + relative * normal_load; }
+  static constexpr double own_share = 0.5, least_share = 0.1;
+
+  /// Largest load change (N) that a granule of this mass (kg) and normal load at locking (N; below 0: not known) sleeps through:
+  /// A weights, but no more than half of what its contacts press with, for at a surface that is less than A weights and a
+  /// granule there would sleep on when its support has gone; no less than a tenth of A weights, and R normal loads on top.
+  double tolerance(double mass, double normal_load) const {
+    const double most = absolute * mass * gravity;
+    if (normal_load < 0) return most;
+    return std::clamp(own_share * normal_load, least_share * most, most) + relative * normal_load;
+  }
 
   /// |F_ext - F_ext(at locking)| over the tolerance; the granule wakes above 1.
   double excess(const Vec3& load, const Vec3& load_at_locking, double mass, double normal_load) const;

@@ -145,5 +145,16 @@ TEST(SolidStateLaw, a_granule_whose_frame_is_shaken_does_not_go_on) {
   EXPECT_FALSE(law.went_on(0.1 * then, then, then + 1.001 * limit, 0.1));
 }
 
+TEST(SolidStateLaw, who_bears_little_must_be_calm_for_longer) {
+  constexpr double weight = 2e-4;
+  EXPECT_EQ(SolidStateLaw::patience(weight, 3 * weight), 1);
+  EXPECT_EQ(SolidStateLaw::patience(weight, 100 * weight), 1);
+  EXPECT_NEAR(SolidStateLaw::patience(weight, weight), std::sqrt(3.0), 1e-12);
+  EXPECT_EQ(SolidStateLaw::patience(weight, 0.5 * weight), 2);
+  EXPECT_EQ(SolidStateLaw::patience(weight, 0), 2);
+  EXPECT_EQ(SolidStateLaw::patience(weight, -1), 1);  // not known
+  EXPECT_EQ(SolidStateLaw::patience(0, 0), 1);        // no gravity: no scale to tell by
+}
+
 }  // namespace
 }  // namespace solidcull

@@ -11,11 +11,22 @@ constexpr double mass = 2.3e-5, g = 9.81, r0 = 5e-3;  // kg, m/s^2, m
 const WakeUpLaw law{3.0, 0.1, g, r0, 4.0};
 
 TEST(WakeUpLaw, tolerance_is_absolute_plus_relative) {
-  EXPECT_DOUBLE_EQ(law.tolerance(mass, 0), 3 * mass * g);
   EXPECT_DOUBLE_EQ(law.tolerance(mass, 0.05), 3 * mass * g + 0.1 * 0.05);
   const WakeUpLaw absolute{3.0, 0.0, g, r0, 4.0}, relative{0.0, 0.1, g, r0, 4.0};
-  EXPECT_EQ(absolute.tolerance(mass, 1e6), absolute.tolerance(mass, 0));
+  EXPECT_DOUBLE_EQ(absolute.tolerance(mass, 1e6), 3 * mass * g);
   EXPECT_DOUBLE_EQ(relative.tolerance(mass, 2.0), 0.2);
+}
+
+TEST(WakeUpLaw, who_bears_little_sleeps_through_half_of_that) {
+  const WakeUpLaw absolute{3.0, 0.0, g, r0, 4.0};
+  const double weight = mass * g;
+  EXPECT_DOUBLE_EQ(absolute.tolerance(mass, 1.2 * weight), 0.6 * weight);  // its support goes: a change of a whole weight
+  EXPECT_GT(absolute.excess(Vec3(0, 0, 0), Vec3(0, 0, weight), mass, 1.2 * weight), 1);
+  EXPECT_DOUBLE_EQ(absolute.tolerance(mass, 6 * weight), 3 * weight);  // from here on A
+  EXPECT_DOUBLE_EQ(absolute.tolerance(mass, 7 * weight), 3 * weight);
+  EXPECT_DOUBLE_EQ(absolute.tolerance(mass, 0), 0.3 * weight);  // in free flight
+  EXPECT_DOUBLE_EQ(absolute.tolerance(mass, -1), 3 * weight);   // not known
+  EXPECT_DOUBLE_EQ(law.tolerance(mass, -1), 3 * weight);
 }
 
 TEST(WakeUpLaw, excess_is_the_load_change_in_tolerances_whatever_its_direction) {
