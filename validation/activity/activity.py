@@ -358,8 +358,8 @@ def mixer():
 
 
 def gas():
-    """A loose gas in a box, without gravity."""
-    return no_harm("gas", None, **short(granules=200))
+    """A loose gas in a box, without gravity; long enough for a clock to tell 2 %."""
+    return no_harm("gas", None, steps=40000, **short(granules=200))
 
 
 def silo():

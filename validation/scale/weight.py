@@ -3,8 +3,9 @@
 
     validation/scale/weight.py [--size 1.28M] [--culling KEYWORDS] [--after N] [--few-steps]
 
-A run in which nothing is ever culled goes beside. Prints, at the same step, the largest difference of an element's load, asleep from
-free, over the mean load of the elements, that of the total load, and how the bed wakes: the interior granules left, and the mean fall over that of a free fall.
+A run in which nothing is ever culled goes beside. Prints the largest change of an element's load since the bed was put to sleep, over
+the mean load of the elements, and that of the total load; the same of the free bed (a large one still trembles); the difference of
+the two at the same step; and how the bed wakes: the interior granules left, and the mean fall over that of a free fall.
 Exit: 0 nothing lost, 1 a granule lost, 2 a run failed.
 """
 import argparse
@@ -40,13 +41,16 @@ def one_part(size, part, settings):
     if part == "free":
         return None
     rows, (asleep, woken) = variables["rows"], [t for t in twin.parse_log(text) if "cull[3]" in "".join(t.columns) and len(t.rows) > 1][-2:]
-    free, late = (activity.element_loads(Path(f"{place / size}-{of}.floor.{4 * rows}.vtk")) for of in ("free", part))
-    size_of = float(np.linalg.norm(free, axis=1).mean()) or 1.0
-    total = float(np.linalg.norm(late.sum(axis=0) - free.sum(axis=0)) / max(1e-30, np.linalg.norm(free, axis=1).sum()))
-    result = {"granules": len(np.load(made_bed["granules"])),
-              "floor": {"elements": len(free), "mean load (N)": size_of, "total, difference": total,
-                        "largest difference": float(np.linalg.norm(late - free, axis=1).max()) / size_of,
-                        "rms difference": float(np.sqrt(((late - free)**2).sum(axis=1).mean())) / size_of}}
+    before, free, late = (activity.element_loads(Path(f"{place / size}-{of}.floor.{step}.vtk"))
+                          for of, step in ((part, rows), ("free", 4 * rows), (part, 4 * rows)))
+    size_of = float(np.linalg.norm(before, axis=1).mean()) or 1.0
+
+    def apart(a, b):
+        return [float(np.linalg.norm(a - b, axis=1).max()) / size_of, float(np.linalg.norm((a - b).sum(axis=0))) / size_of / len(a)]
+    result = {"granules": len(np.load(made_bed["granules"])), "elements": len(free), "mean load (N)": size_of,
+              "largest change of an element, and of all": {"asleep, since before": apart(late, before),
+                                                           "free, in that time": apart(free, before),
+                                                           "asleep from free": apart(late, free)}}
     column = {name: k for k, name in enumerate(woken.columns)}
     result["interior"] = {"asleep": int(asleep.rows[-1][column["cull[3]"]]),
                           "rows": [[int(r[column["Step"]] - woken.rows[0][column["Step"]]), int(r[column["cull[1]"]]), int(r[column["cull[3]"]])]
@@ -76,7 +80,8 @@ def main(argv=None):
     report = {part: one_part(size, part, settings) for part in ("drop", "unfix")}
     (scale.OUT / "weight.json").write_text(json.dumps(report, indent=1) + "\n")
     for part, r in report.items():
-        print(f"{size}, {part}, floor: " + ", ".join(f"{name} {value:.3g}" for name, value in r["floor"].items()))
+        for name, (one, total) in r["largest change of an element, and of all"].items():
+            print(f"{size}, {part}, floor of {r['elements']} elements, {name}: largest {one:.2g}, total {total:.2g}")
         steps = ", ".join(f"{interior} after {step}" for step, _, interior in r["interior"]["rows"])
         print(f"{size}, {part}: interior granules {r['interior']['asleep']} asleep; then {steps} steps; fell "
               f"{r['mean fall over free fall']:.4f} of a free fall; lost {r['lost']} of {r['granules']}")
