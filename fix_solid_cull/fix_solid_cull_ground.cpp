@@ -39,7 +39,8 @@ void FixSolidCull::set_grounded(int body, bool on) {
   b.changed = true;
   b.step_then = -1;
   b.acceleration = Vec3::Zero();
-  b.twist = {b.pose.to_world(b.mass.centre()), Vec3::Zero(), Vec3::Zero()};
+  // a sphere that spins on the spot stands still too
+  b.twist = {b.pose.to_world(b.mass.centre()), Vec3::Zero(), b.is_one_granule() ? b.twist.spin : Vec3(Vec3::Zero())};
   rested_.erase(body);
   pressed_.erase(body);
   clear_of_walls_.erase(body);
@@ -53,6 +54,22 @@ void FixSolidCull::find_frame(int body) {
   const bool shares = b.grounded && b.pose == Pose();
   if (!shares && store_->frame_of(body) == GranuleStore::shared_frame) clear_of_walls_.erase(body);
   store_->share(body, shares);
+}
+
+/// A sphere is the same whatever way it is turned: its frame becomes the world's, which grounded bodies share.
+void FixSolidCull::turn_back(int body, int i) {
+  SolidBody& b = bodies_.body(body);
+  if (b.pose == Pose() || meshes_wanted_) return;
+  ShellEntry& e = shell_[i];
+  e.place = b.pose.to_world(e.place);
+  e.reference = b.pose.turned_to_world(e.reference);
+  e.load_change = b.pose.turned_to_world(e.load_change);
+  b.felt = b.pose.turned_to_world(b.felt);
+  b.mass = MassProperties();
+  b.mass.add(atom->rmass[i], e.place, atom->radius[i], 1, e.held);
+  b.pose = Pose();
+  at_home_.erase(body);
+  drawn_.erase(body);
 }
 
 void FixSolidCull::forget_body(int body) {
@@ -80,8 +97,11 @@ void FixSolidCull::ground_bodies() {
   const Vec3 g = gravity();
   const Vec3 down = g.norm() > 0 ? Vec3(g.normalized()) : Vec3(Vec3::Zero());
   const double slow = SolidStateLaw::drift_share * solid_state_.speed;
-  FlatMap<Vec3> net;
-  for (const ActiveBody& a : active_) net[a.number] = a.force;
+  FlatMap<const ActiveBody*> net;
+  for (const ActiveBody& a : active_) net[a.number] = &a;
+  FlatMap<int> only;  // body of one granule -> its atom
+  for (const int i : locked_index_)
+    if (bodies_.body(shell_[i].body).is_one_granule()) only[shell_[i].body] = i;
   for (auto& [number, body] : bodies_.bodies()) {
     const bool held = body.mass.held > 0 || spanning_held.count(key_of(number));
     if (body.grounded) {
@@ -95,14 +115,21 @@ void FixSolidCull::ground_bodies() {
       continue;
     }
     const double size = std::cbrt(static_cast<double>(body.mass.count)) * diameter_;
-    const Vec3* force = net.find(number);
-    const bool at_rest = held && force && force->norm() < balance_share * body.motion.mass() * weight_scale_ &&
-                         body.twist.at(body.pose.to_world(body.mass.centre())).norm() + body.twist.spin.norm() * size < slow;
+    const ActiveBody* const* loads = net.find(number);
+    const int* one = only.find(number);
+    const double balance = balance_share * body.motion.mass() * weight_scale_, turns = body.twist.spin.norm() * size;
+    // one granule may spin on the spot for ever: nothing brakes it where it touches the wall
+    const bool spins_on_the_spot =
+        one && loads && shell_[*one].wall_slip < slow && (*loads)->torque.norm() < balance * atom->radius[*one];
+    const bool at_rest =
+        held && loads && (*loads)->force.norm() < balance &&
+        body.twist.at(body.pose.to_world(body.mass.centre())).norm() + (spins_on_the_spot ? 0.0 : turns) < slow;
     if (!at_rest) {
       rested_.erase(number);
       continue;
     }
     if (++rested_[number] < looks_at_rest) continue;
+    if (one) turn_back(number, *one);
     set_grounded(number, true);
   }
   if (any_rank(locked_index_stale_)) {

@@ -139,6 +139,7 @@ void FixSolidCull::see_walls(bool new_run) {
   const int owned = atom->nlocal;
   std::vector<int> touched(owned, 0), there(owned, 0);
   std::vector<char> moves(owned, 0), near(owned, 0), near_moving(owned, 0), stands(owned, 0);
+  std::vector<double> slip(owned, 0.0);
   FlatMap<Sphere> moving_plugs;
   const double plug_radius = 0.5 * (settings_.depth * diameter_ + closing()) + diameter_;
   for (const WallContact& c : walls_.find()) {
@@ -150,6 +151,7 @@ void FixSolidCull::see_walls(bool new_run) {
       ++touched[i];
       moves[i] = moves[i] || c.moving;
       stands[i] = stands[i] || !c.moving;
+      slip[i] = std::max(slip[i], (vec(atom->v[i]) + vec(atom->omega[i]).cross(c.to_wall)).norm());
     }
     if (!needs_surface()) continue;
     const ShellEntry& e = shell_[i];
@@ -201,6 +203,7 @@ void FixSolidCull::see_walls(bool new_run) {
     e.wall_near = near[i];
     e.moving_wall_near = near_moving[i];
     e.stands = stands[i];
+    e.wall_slip = slip[i];
   }
 }
 
@@ -241,6 +244,7 @@ bool FixSolidCull::find_calm() {
     int i, j;
   };
   std::vector<Pair> between_bodies;
+  const double bears = neighbor->contactDistanceFactor;
   for (int row = 0; row < list->inum; ++row) {
     const int i = list->ilist[row];
     if (i >= owned) continue;
@@ -252,7 +256,9 @@ bool FixSolidCull::find_calm() {
       if (square > reach * reach) continue;
       const MovingSphere b = state(j);
       const double radii = a.radius + b.radius;
-      const bool pressed = square < radii * radii, drifts = !pressed && !law.still_neighbour(a, b);
+      const bool pressed = square < radii * radii;
+      if (!pressed && square > bears * bears * radii * radii && law.spins_beside(a, b)) continue;
+      const bool drifts = !pressed && !law.still_neighbour(a, b);
       loaded[i] |= pressed;
       drifting[i] |= drifts;
       if (j < owned) {
@@ -523,6 +529,7 @@ void FixSolidCull::prepare_locking() {
   const auto will_be_locked = [&](int i) {
     return (atom->mask[i] & interface_bit) || i >= owned || chosen.contains(atom->tag[i]);
   };
+  const auto state = [&](int i) { return MovingSphere{vec(atom->x[i]), vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]}; };
   side_changes_.clear();
   touches_.clear();
   for (int row = 0; row < list->inum; ++row) {
@@ -534,10 +541,12 @@ void FixSolidCull::prepare_locking() {
       const double distance = (vec(atom->x[i]) - vec(atom->x[j])).norm();
       if (distance > radii * (1 + SolidStateLaw::gap)) continue;
       const bool first = will_be_locked(i), second = will_be_locked(j);
-      if (first && second) touches_.push_back({atom->tag[i], atom->tag[j]});
+      const bool bears = distance <= radii * neighbor->contactDistanceFactor;
+      if (first && second && (bears || !solid_state_.spins_beside(state(i), state(j))))
+        touches_.push_back({atom->tag[i], atom->tag[j]});
       // between owned granules the force is taken in the very state that is frozen; across ranks it is taken now
       const bool side_change = first && second && j >= owned && shell_[i].locked && !(atom->mask[j] & interface_bit);
-      if (side_change && distance <= radii * neighbor->contactDistanceFactor)
+      if (side_change && bears)
         side_changes_.push_back({atom->tag[i], atom->tag[j], pair_force_.on_first(i, k)});
     }
   }

@@ -102,6 +102,7 @@ struct SolidBody {
     visit(grounded);
   }
 
+  bool is_one_granule() const { return mass.count == 1 && !spanned; }
   RigidPart part() const;  ///< this rank's part, world frame
   FreeAxes free_axes() const;
 };
