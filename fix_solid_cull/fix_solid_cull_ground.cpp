@@ -161,24 +161,19 @@ void FixSolidCull::share_out_loads() {
 }
 
 void FixSolidCull::press_on_walls() {
+  for (const auto& [place, e] : wall_loads_.of_all()) mesh_loads_.press(place.first, place.second, -e.force, -e.torque);
   // a body that stands still in spite of a load hands it on to the walls that hold it
-  FlatMap<const Vec3*> change;
   for (const ActiveBody& a : active_) {
     if (!a.stands) continue;
     Vec3& mean = pressed_[a.number].value;
     mean += (a.change - mean) / look_every_;
-    change[a.number] = &a.change;
-  }
-  wall_loads_.for_each([&](int body, int mesh, int element, const FrozenWallLoads::Element& e) {
-    Vec3 force = -e.force, torque = -e.torque;
-    const Vec3* const* more = e.share > 0 ? change.find(body) : nullptr;
-    if (more) {  // where the element bears its own load
-      const Vec3 extra = e.share * **more, at = e.force.cross(e.torque) / e.force.squaredNorm();
-      force += extra;
-      torque += at.cross(extra);
+    if (a.change.isZero(0)) continue;
+    for (const auto& [place, e] : wall_loads_.of(a.number)) {
+      if (!(e.share > 0)) continue;
+      const Vec3 extra = e.share * a.change, at = e.force.cross(e.torque) / e.force.squaredNorm();
+      mesh_loads_.press(place.first, place.second, extra, at.cross(extra));  // where the element bears its own load
     }
-    mesh_loads_.press(mesh, element, force, torque);
-  });
+  }
 }
 
 }  // namespace solidcull

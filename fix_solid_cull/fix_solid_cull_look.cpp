@@ -289,6 +289,9 @@ bool FixSolidCull::find_calm() {
     ShellEntry& e = shell_[i];
     if (e.locked) continue;
     if (e.walls > 0) loaded[i] = 1;
+    // a granule that touches nothing but a wall that stands still is one with it where it stays: not where it rolls or slides
+    const double fastest = std::max(vec(atom->v[i]).norm(), e.wall_slip);
+    if (!touching[i] && e.stands && fastest >= law.speed) moving[i] = 1;
     bool solid = (touching[i] || e.walls > 0) && !moving[i] && (loaded[i] || !drifting[i]) && (atom->mask[i] & groupbit) &&
                  can_be_culled(atom->mask[i]);
     if (solid && rigid()) {
@@ -611,7 +614,7 @@ void FixSolidCull::judge_worth(std::int64_t chosen, std::int64_t exterior) {
   builds_asked_ = 0;
   restored_then_ = ledger_.granules_restored();
   const bool culling = chosen + counts[0] + counts[1] > 0;
-  const int wait = worth_.judge(saved, spent, culling);
+  const int wait = worth_.judge(saved, spent, culling, chosen > counts[0] + counts[1]);
   if (wait == 0) return;
   no_cull_until_ = std::max(no_cull_until_, update->ntimestep + static_cast<std::int64_t>(wait) * look_every_);
   energy_then_ = kinetic_energy_of_exterior();
@@ -623,8 +626,8 @@ void FixSolidCull::judge_worth(std::int64_t chosen, std::int64_t exterior) {
 }
 
 void FixSolidCull::ask_for_build(std::int64_t step) {
+  if (next_reneighbor != step) ++builds_asked_;
   next_reneighbor = step;
-  ++builds_asked_;
 }
 
 void FixSolidCull::schedule_next_look() {
