@@ -73,14 +73,13 @@ void FixSolidCull::look() {
   } else {
     leave_out_what_is_not_steady();
   }
+  if (any_rank(!chosen_.empty())) prepare_locking();
   std::int64_t counts[3] = {static_cast<std::int64_t>(chosen_.size()), 0, 0};
   for (int i = 0; i < atom->nlocal; ++i) counts[1] += !shell_[i].locked;
   for (const std::int64_t tag : chosen_) counts[2] += overdue_.contains(tag);
   MPI_Allreduce(MPI_IN_PLACE, counts, 3, MPI_INT64_T, MPI_SUM, world);
-  if (counts[0] > 0) {
-    prepare_locking();
-    if (counts[0] >= worth_share * static_cast<double>(counts[1]) || counts[2] > 0) ask_for_build(update->ntimestep + 1);
-  }
+  if (counts[0] > 0 && (counts[0] >= worth_share * static_cast<double>(counts[1]) || counts[2] > 0))
+    ask_for_build(update->ntimestep + 1);
   if (any_rank(!joins_.empty())) ask_for_build(update->ntimestep + 1);
   if (may_cull && quick_looks_ == 0) {
     judge_worth(counts[0], counts[1]);
@@ -535,6 +534,7 @@ void FixSolidCull::prepare_locking() {
   const auto state = [&](int i) { return MovingSphere{vec(atom->x[i]), vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]}; };
   side_changes_.clear();
   touches_.clear();
+  std::vector<char> touching(owned, 0), goes_along(owned, 0);
   for (int row = 0; row < list->inum; ++row) {
     const int i = list->ilist[row];
     if (i >= owned) continue;
@@ -545,14 +545,28 @@ void FixSolidCull::prepare_locking() {
       if (distance > radii * (1 + SolidStateLaw::gap)) continue;
       const bool first = will_be_locked(i), second = will_be_locked(j);
       const bool bears = distance <= radii * neighbor->contactDistanceFactor;
-      if (first && second && (bears || !solid_state_.spins_beside(state(i), state(j))))
-        touches_.push_back({atom->tag[i], atom->tag[j]});
+      if (!bears && solid_state_.spins_beside(state(i), state(j))) continue;
+      if (first && second) touches_.push_back({atom->tag[i], atom->tag[j]});
+      touching[i] = 1;
+      goes_along[i] |= second;
+      if (j < owned) {
+        touching[j] = 1;
+        goes_along[j] |= first;
+      }
       // between owned granules the force is taken in the very state that is frozen; across ranks it is taken now
       const bool side_change = first && second && j >= owned && shell_[i].locked && !(atom->mask[j] & interface_bit);
       if (side_change && bears)
         side_changes_.push_back({atom->tag[i], atom->tag[j], pair_force_.on_first(i, k)});
     }
   }
+  // alone among neighbours that all stay exterior it would make no solid: nothing is saved until one of them comes along
+  for (int i = 0; i < owned; ++i) {
+    if (!touching[i] || goes_along[i] || !chosen.contains(atom->tag[i])) continue;
+    chosen.erase(atom->tag[i]);
+    shell_[i].waited = 0;
+  }
+  chosen_.erase(std::remove_if(chosen_.begin(), chosen_.end(), [&](std::int64_t tag) { return !chosen.contains(tag); }),
+                chosen_.end());
 }
 
 /// The load on these owned granules, from look to look: one that still changes is no solid state, however slowly its granule
