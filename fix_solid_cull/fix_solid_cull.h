@@ -200,7 +200,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   bool stands_still(int body) const;  // its granules at still walls may go to the store
   void ground_bodies();
   void set_grounded(int body, bool on);
-  void turn_back(int body, int i);
+  void ground_one(int body, int i);
   void share_out_loads();
   void press_on_walls();
   void find_frame(int body);
@@ -435,7 +435,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::vector<int> motion_words_;  // of a record: what is of no worth once a step has passed
   // lock_step in a compact store, which needs to know no more
   static constexpr std::int64_t locked_long_ago = -1, locked_as_it_was_stored = -2;
-  std::int64_t stored_at_ = -1;    // step in which granules last went into the store
+  std::int64_t stored_at_ = -1;  // step in which granules last went into the store
   bool lists_are_new_ = false;
   bool map_cleared_ = false;
   bool thawed_ = false;
@@ -448,7 +448,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   std::int64_t restored_then_ = 0;  // granules restored until then
   bool told_no_worth_ = false;
   double energy_then_ = 0;  // kinetic energy of what was exterior when culling began to wait (J); 0: it does not
-  int quick_looks_ = 0;  // left at the start of a run in which nothing is culled yet
+  int quick_looks_ = 0;     // left at the start of a run in which nothing is culled yet
   std::int64_t next_look_ = -1, last_look_ = INT32_MIN;
   std::int64_t membership_version_ = 0;
   double largest_excess_ = 0;

@@ -56,11 +56,14 @@ void FixSolidCull::find_frame(int body) {
   store_->share(body, shares);
 }
 
-/// A sphere is the same whatever way it is turned: its frame becomes the world's, which grounded bodies share.
-void FixSolidCull::turn_back(int body, int i) {
+/// A body of one granule has moved as the granule alone would: it is culled only now that it stands. A sphere is the same
+/// whatever way it is turned: its frame becomes the world's, which grounded bodies share.
+void FixSolidCull::ground_one(int body, int i) {
   SolidBody& b = bodies_.body(body);
-  if (b.pose == Pose() || meshes_wanted_) return;
   ShellEntry& e = shell_[i];
+  e.reference += e.load_change;
+  e.load_change = Vec3::Zero();
+  if (b.pose == Pose() || meshes_wanted_) return;
   e.place = b.pose.to_world(e.place);
   e.reference = b.pose.turned_to_world(e.reference);
   e.load_change = b.pose.turned_to_world(e.load_change);
@@ -121,15 +124,19 @@ void FixSolidCull::ground_bodies() {
     // one granule may spin on the spot for ever: nothing brakes it where it touches the wall
     const bool spins_on_the_spot =
         one && loads && shell_[*one].wall_slip < slow && (*loads)->torque.norm() < balance * atom->radius[*one];
-    const bool at_rest =
-        held && loads && (*loads)->force.norm() < balance &&
-        body.twist.at(body.pose.to_world(body.mass.centre())).norm() + (spins_on_the_spot ? 0.0 : turns) < slow;
+    const bool at_rest = held && loads && (*loads)->force.norm() < balance &&
+                         body.twist.at(body.pose.to_world(body.mass.centre())).norm() + (spins_on_the_spot ? 0.0 : turns) < slow;
     if (!at_rest) {
       rested_.erase(number);
       continue;
     }
     if (++rested_[number] < looks_at_rest) continue;
-    if (one) turn_back(number, *one);
+    if (one) ground_one(number, *one);
+    // its walls bear what presses on it by now; what they are handed in addition counts from here
+    const Sum* stored = stored_change_.find(number);
+    body.change_then = stored ? stored->value : Vec3(Vec3::Zero());
+    for (const int i : locked_index_)
+      if (shell_[i].body == number) body.change_then += shell_[i].load_change;
     set_grounded(number, true);
   }
   if (any_rank(locked_index_stale_)) {

@@ -555,8 +555,7 @@ void FixSolidCull::prepare_locking() {
       }
       // between owned granules the force is taken in the very state that is frozen; across ranks it is taken now
       const bool side_change = first && second && j >= owned && shell_[i].locked && !(atom->mask[j] & interface_bit);
-      if (side_change && bears)
-        side_changes_.push_back({atom->tag[i], atom->tag[j], pair_force_.on_first(i, k)});
+      if (side_change && bears) side_changes_.push_back({atom->tag[i], atom->tag[j], pair_force_.on_first(i, k)});
     }
   }
   // alone among neighbours that all stay exterior it would make no solid: nothing is saved until one of them comes along

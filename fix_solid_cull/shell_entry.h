@@ -20,10 +20,10 @@ struct ShellEntry {
                                     ///< exterior granule: acceleration of what it touched when calm began (m/s^2)
   Vec3 load_change = Vec3::Zero();  ///< F_ext - reference at the last step; frame of the body (N)
   static constexpr double not_known = -1;
-  double normal_load = not_known;   ///< sum of normal contact forces at locking (N). Of an exterior granule: at the last look
-  double excess = 0;                ///< largest load change over tolerance since the last wake-up
-  std::int64_t lock_step = -1;      ///< of an exterior granule: when calm began
-  bool held = false;                ///< touched a wall that stands still when it was locked
+  double normal_load = not_known;  ///< sum of normal contact forces at locking (N). Of an exterior granule: at the last look
+  double excess = 0;               ///< largest load change over tolerance since the last wake-up
+  std::int64_t lock_step = -1;     ///< of an exterior granule: when calm began
+  bool held = false;               ///< touched a wall that stands still when it was locked
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< at locking, given back only if no step has passed. Of an exterior
                                                       ///< granule: its velocity when calm began
 
