@@ -31,7 +31,7 @@
 namespace solidcull {
 namespace {
 
-// waking granules are handled together after so many steps: a sound wave crosses one or two granules in that time
+// waking granules are handled together after about so many steps: a sound wave crosses one or two granules in that time
 constexpr int wake_together = 20;
 // but a load change of so many tolerances at once
 constexpr double blow = 10;
@@ -513,7 +513,11 @@ void FixSolidCull::rebase_thawed_contacts() {
 void FixSolidCull::ask_for_reneighbouring_if_waking() {
   // gentle loads wait for each other; a blow does not: what it strikes would stand like a rock until then
   if (locked_everywhere_ == 0) return;
-  const bool time = update->ntimestep % wake_together == 0;
+  // looks are among these steps: one rebuild of the neighbour lists does for what wakes and what is culled
+  const auto fits = [](double in, double of) { return std::max(1, static_cast<int>(std::lround(in / of))); };
+  const int cycle = look_every_ * fits(wake_together, look_every_), times = fits(cycle, wake_together);
+  const int period = (cycle + times - 1) / times;
+  const bool time = update->ntimestep % cycle % period == 0;
   if (comm->nprocs == 1 ? !(time || largest_excess_ > blow) : !(time || any_rank(largest_excess_ > blow))) return;
   bool waking = false;
   for (const int i : locked_index_) {
@@ -524,7 +528,7 @@ void FixSolidCull::ask_for_reneighbouring_if_waking() {
     }
     e.excess = 0;
   }
-  int asked[2] = {waking || (rigid() && body_comes_too_far(wake_together + 1)), rigid() && body_is_fast(wake_together + 1)};
+  int asked[2] = {waking || (rigid() && body_comes_too_far(period + 1)), rigid() && body_is_fast(period + 1)};
   if (comm->nprocs > 1) MPI_Allreduce(MPI_IN_PLACE, asked, 2, MPI_INT, MPI_MAX, world);
   if (asked[0]) ask_for_build(update->ntimestep + 1);
   fast_bodies_ = asked[1];

@@ -202,6 +202,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   bool stands_still(int body) const;  // its granules at still walls may go to the store
   void ground_bodies();
   void set_grounded(int body, bool on);
+  void ground_one(int body, int i);
   void share_out_loads();
   void press_on_walls();
   void find_frame(int body);

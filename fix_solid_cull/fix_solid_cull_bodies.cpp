@@ -125,8 +125,11 @@ void FixSolidCull::take_loads() {
     set(atom->torque[i], Vec3::Zero());
   }
   if (sleeping())
-    for (ActiveBody& a : active_)
-      if (const Sum* stored = a.stands ? stored_change_.find(a.number) : nullptr) a.change += stored->value;
+    for (ActiveBody& a : active_) {
+      if (!a.stands) continue;
+      if (const Sum* stored = stored_change_.find(a.number)) a.change += stored->value;
+      a.change = a.body->pose.turned_to_world(a.change - a.body->change_then);
+    }
   if (moves) sum_over_bodies();
   if (sleeping()) press_on_walls();
 }

@@ -40,7 +40,8 @@ void FixSolidCull::set_grounded(int body, bool on) {
   b.changed = true;
   b.step_then = -1;
   b.acceleration = Vec3::Zero();
-  b.twist = {b.pose.to_world(b.mass.centre()), Vec3::Zero(), Vec3::Zero()};
+  // a sphere that spins on the spot stands still too
+  b.twist = {b.pose.to_world(b.mass.centre()), Vec3::Zero(), b.is_one_granule() ? b.twist.spin : Vec3(Vec3::Zero())};
   rested_.erase(body);
   pressed_.erase(body);
   clear_of_walls_.erase(body);
@@ -54,6 +55,25 @@ void FixSolidCull::find_frame(int body) {
   const bool shares = b.grounded && b.pose == Pose();
   if (!shares && store_->frame_of(body) == GranuleStore::shared_frame) clear_of_walls_.erase(body);
   store_->share(body, shares);
+}
+
+/// A body of one granule has moved as the granule alone would: it is culled only now that it stands. A sphere is the same
+/// whatever way it is turned: its frame becomes the world's, which grounded bodies share.
+void FixSolidCull::ground_one(int body, int i) {
+  SolidBody& b = bodies_.body(body);
+  ShellEntry& e = shell_[i];
+  e.reference += e.load_change;
+  e.load_change = Vec3::Zero();
+  if (b.pose == Pose() || meshes_wanted_) return;
+  e.place = b.pose.to_world(e.place);
+  e.reference = b.pose.turned_to_world(e.reference);
+  e.load_change = b.pose.turned_to_world(e.load_change);
+  b.felt = b.pose.turned_to_world(b.felt);
+  b.mass = MassProperties();
+  b.mass.add(atom->rmass[i], e.place, atom->radius[i], 1, e.held);
+  b.pose = Pose();
+  at_home_.erase(body);
+  drawn_.erase(body);
 }
 
 void FixSolidCull::forget_body(int body) {
@@ -81,8 +101,11 @@ void FixSolidCull::ground_bodies() {
   const Vec3 g = gravity();
   const Vec3 down = g.norm() > 0 ? Vec3(g.normalized()) : Vec3(Vec3::Zero());
   const double slow = SolidStateLaw::drift_share * solid_state_.speed;
-  FlatMap<Vec3> net;
-  for (const ActiveBody& a : active_) net[a.number] = a.force;
+  FlatMap<const ActiveBody*> net;
+  for (const ActiveBody& a : active_) net[a.number] = &a;
+  FlatMap<int> only;  // body of one granule -> its atom
+  for (const int i : locked_index_)
+    if (bodies_.body(shell_[i].body).is_one_granule()) only[shell_[i].body] = i;
   for (auto& [number, body] : bodies_.bodies()) {
     const bool held = body.mass.held > 0 || spanning_held.count(key_of(number));
     if (body.grounded) {
@@ -96,14 +119,25 @@ void FixSolidCull::ground_bodies() {
       continue;
     }
     const double size = std::cbrt(static_cast<double>(body.mass.count)) * diameter_;
-    const Vec3* force = net.find(number);
-    const bool at_rest = held && force && force->norm() < balance_share * body.motion.mass() * weight_scale_ &&
-                         body.twist.at(body.pose.to_world(body.mass.centre())).norm() + body.twist.spin.norm() * size < slow;
+    const ActiveBody* const* loads = net.find(number);
+    const int* one = only.find(number);
+    const double balance = balance_share * body.motion.mass() * weight_scale_, turns = body.twist.spin.norm() * size;
+    // one granule may spin on the spot for ever: nothing brakes it where it touches the wall
+    const bool spins_on_the_spot =
+        one && loads && shell_[*one].wall_slip < slow && (*loads)->torque.norm() < balance * atom->radius[*one];
+    const bool at_rest = held && loads && (*loads)->force.norm() < balance &&
+                         body.twist.at(body.pose.to_world(body.mass.centre())).norm() + (spins_on_the_spot ? 0.0 : turns) < slow;
     if (!at_rest) {
       rested_.erase(number);
       continue;
     }
     if (++rested_[number] < looks_at_rest) continue;
+    if (one) ground_one(number, *one);
+    // its walls bear what presses on it by now; what they are handed in addition counts from here
+    const Sum* stored = stored_change_.find(number);
+    body.change_then = stored ? stored->value : Vec3(Vec3::Zero());
+    for (const int i : locked_index_)
+      if (shell_[i].body == number) body.change_then += shell_[i].load_change;
     set_grounded(number, true);
   }
   if (any_rank(locked_index_stale_)) {
@@ -136,24 +170,19 @@ void FixSolidCull::share_out_loads() {
 }
 
 void FixSolidCull::press_on_walls() {
+  for (const auto& [place, e] : wall_loads_.of_all()) mesh_loads_.press(place.first, place.second, -e.force, -e.torque);
   // a body that stands still in spite of a load hands it on to the walls that hold it
-  FlatMap<const Vec3*> change;
   for (const ActiveBody& a : active_) {
     if (!a.stands) continue;
     Vec3& mean = pressed_[a.number].value;
     mean += (a.change - mean) / look_every_;
-    change[a.number] = &a.change;
-  }
-  wall_loads_.for_each([&](int body, int mesh, int element, const FrozenWallLoads::Element& e) {
-    Vec3 force = -e.force, torque = -e.torque;
-    const Vec3* const* more = e.share > 0 ? change.find(body) : nullptr;
-    if (more) {  // where the element bears its own load
-      const Vec3 extra = e.share * **more, at = e.force.cross(e.torque) / e.force.squaredNorm();
-      force += extra;
-      torque += at.cross(extra);
+    if (a.change.isZero(0)) continue;
+    for (const auto& [place, e] : wall_loads_.of(a.number)) {
+      if (!(e.share > 0)) continue;
+      const Vec3 extra = e.share * a.change, at = e.force.cross(e.torque) / e.force.squaredNorm();
+      mesh_loads_.press(place.first, place.second, extra, at.cross(extra));  // where the element bears its own load
     }
-    mesh_loads_.press(mesh, element, force, torque);
-  });
+  }
 }
 
 }  // namespace solidcull

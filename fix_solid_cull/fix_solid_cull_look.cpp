@@ -73,14 +73,13 @@ void FixSolidCull::look() {
   } else {
     leave_out_what_is_not_steady();
   }
+  if (any_rank(!chosen_.empty())) prepare_locking();
   std::int64_t counts[3] = {static_cast<std::int64_t>(chosen_.size()), 0, 0};
   for (int i = 0; i < atom->nlocal; ++i) counts[1] += !shell_[i].locked;
   for (const std::int64_t tag : chosen_) counts[2] += overdue_.contains(tag);
   MPI_Allreduce(MPI_IN_PLACE, counts, 3, MPI_INT64_T, MPI_SUM, world);
-  if (counts[0] > 0) {
-    prepare_locking();
-    if (counts[0] >= worth_share * static_cast<double>(counts[1]) || counts[2] > 0) ask_for_build(update->ntimestep + 1);
-  }
+  if (counts[0] > 0 && (counts[0] >= worth_share * static_cast<double>(counts[1]) || counts[2] > 0))
+    ask_for_build(update->ntimestep + 1);
   if (any_rank(!joins_.empty())) ask_for_build(update->ntimestep + 1);
   if (may_cull && quick_looks_ == 0) {
     judge_worth(counts[0], counts[1]);
@@ -139,6 +138,7 @@ void FixSolidCull::see_walls(bool new_run) {
   const int owned = atom->nlocal;
   std::vector<int> touched(owned, 0), there(owned, 0);
   std::vector<char> moves(owned, 0), near(owned, 0), near_moving(owned, 0), stands(owned, 0);
+  std::vector<double> slip(owned, 0.0);
   FlatMap<Sphere> moving_plugs;
   const double plug_radius = 0.5 * (settings_.depth * diameter_ + closing()) + diameter_;
   for (const WallContact& c : walls_.find()) {
@@ -150,6 +150,7 @@ void FixSolidCull::see_walls(bool new_run) {
       ++touched[i];
       moves[i] = moves[i] || c.moving;
       stands[i] = stands[i] || !c.moving;
+      slip[i] = std::max(slip[i], (vec(atom->v[i]) + vec(atom->omega[i]).cross(c.to_wall)).norm());
     }
     if (!needs_surface()) continue;
     const ShellEntry& e = shell_[i];
@@ -201,6 +202,7 @@ void FixSolidCull::see_walls(bool new_run) {
     e.wall_near = near[i];
     e.moving_wall_near = near_moving[i];
     e.stands = stands[i];
+    e.wall_slip = slip[i];
   }
 }
 
@@ -241,6 +243,7 @@ bool FixSolidCull::find_calm() {
     int i, j;
   };
   std::vector<Pair> between_bodies;
+  const double bears = neighbor->contactDistanceFactor;
   for (int row = 0; row < list->inum; ++row) {
     const int i = list->ilist[row];
     if (i >= owned) continue;
@@ -252,7 +255,9 @@ bool FixSolidCull::find_calm() {
       if (square > reach * reach) continue;
       const MovingSphere b = state(j);
       const double radii = a.radius + b.radius;
-      const bool pressed = square < radii * radii, drifts = !pressed && !law.still_neighbour(a, b);
+      const bool pressed = square < radii * radii;
+      if (!pressed && square > bears * bears * radii * radii && law.spins_beside(a, b)) continue;
+      const bool drifts = !pressed && !law.still_neighbour(a, b);
       loaded[i] |= pressed;
       drifting[i] |= drifts;
       if (j < owned) {
@@ -283,6 +288,9 @@ bool FixSolidCull::find_calm() {
     ShellEntry& e = shell_[i];
     if (e.locked) continue;
     if (e.walls > 0) loaded[i] = 1;
+    // a granule that touches nothing but a wall that stands still is one with it where it stays: not where it rolls or slides
+    const double fastest = std::max(vec(atom->v[i]).norm(), e.wall_slip);
+    if (!touching[i] && e.stands && fastest >= law.speed) moving[i] = 1;
     bool solid = (touching[i] || e.walls > 0) && !moving[i] && (loaded[i] || !drifting[i]) && (atom->mask[i] & groupbit) &&
                  can_be_culled(atom->mask[i]);
     if (solid && rigid()) {
@@ -529,8 +537,10 @@ void FixSolidCull::prepare_locking() {
   const auto will_be_locked = [&](int i) {
     return (atom->mask[i] & interface_bit) || i >= owned || chosen.contains(atom->tag[i]);
   };
+  const auto state = [&](int i) { return MovingSphere{vec(atom->x[i]), vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]}; };
   side_changes_.clear();
   touches_.clear();
+  std::vector<char> touching(owned, 0), goes_along(owned, 0);
   for (int row = 0; row < list->inum; ++row) {
     const int i = list->ilist[row];
     if (i >= owned) continue;
@@ -540,13 +550,28 @@ void FixSolidCull::prepare_locking() {
       const double distance = (vec(atom->x[i]) - vec(atom->x[j])).norm();
       if (distance > radii * (1 + SolidStateLaw::gap)) continue;
       const bool first = will_be_locked(i), second = will_be_locked(j);
+      const bool bears = distance <= radii * neighbor->contactDistanceFactor;
+      if (!bears && solid_state_.spins_beside(state(i), state(j))) continue;
       if (first && second) touches_.push_back({atom->tag[i], atom->tag[j]});
+      touching[i] = 1;
+      goes_along[i] |= second;
+      if (j < owned) {
+        touching[j] = 1;
+        goes_along[j] |= first;
+      }
       // between owned granules the force is taken in the very state that is frozen; across ranks it is taken now
       const bool side_change = first && second && j >= owned && shell_[i].locked && !(atom->mask[j] & interface_bit);
-      if (side_change && distance <= radii * neighbor->contactDistanceFactor)
-        side_changes_.push_back({atom->tag[i], atom->tag[j], pair_force_.on_first(i, k)});
+      if (side_change && bears) side_changes_.push_back({atom->tag[i], atom->tag[j], pair_force_.on_first(i, k)});
     }
   }
+  // alone among neighbours that all stay exterior it would make no solid: nothing is saved until one of them comes along
+  for (int i = 0; i < owned; ++i) {
+    if (!touching[i] || goes_along[i] || !chosen.contains(atom->tag[i])) continue;
+    chosen.erase(atom->tag[i]);
+    shell_[i].waited = 0;
+  }
+  chosen_.erase(std::remove_if(chosen_.begin(), chosen_.end(), [&](std::int64_t tag) { return !chosen.contains(tag); }),
+                chosen_.end());
 }
 
 /// The load on these owned granules, from look to look: one that still changes is no solid state, however slowly its granule
@@ -608,7 +633,7 @@ void FixSolidCull::judge_worth(std::int64_t chosen, std::int64_t exterior) {
   builds_asked_ = 0;
   restored_then_ = ledger_.granules_restored();
   const bool culling = chosen + counts[0] + counts[1] > 0;
-  const int wait = worth_.judge(saved, spent, culling);
+  const int wait = worth_.judge(saved, spent, culling, chosen > counts[0] + counts[1]);
   if (wait == 0) return;
   no_cull_until_ = std::max(no_cull_until_, update->ntimestep + static_cast<std::int64_t>(wait) * look_every_);
   energy_then_ = kinetic_energy_of_exterior();
@@ -620,8 +645,8 @@ void FixSolidCull::judge_worth(std::int64_t chosen, std::int64_t exterior) {
 }
 
 void FixSolidCull::ask_for_build(std::int64_t step) {
+  if (next_reneighbor != step) ++builds_asked_;
   next_reneighbor = step;
-  ++builds_asked_;
 }
 
 void FixSolidCull::schedule_next_look() {

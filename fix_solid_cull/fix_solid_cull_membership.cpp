@@ -1027,7 +1027,7 @@ void FixSolidCull::store_what_is_deep(bool change) {
     const Sphere& s = self.sphere;
     // bodies that both stand still may be as near as they like, but what they do to each other needs two atoms
     const auto touches = [&](const Sphere& other) {
-      const double reach = (1 + SolidStateLaw::gap) * (s.radius + other.radius);
+      const double reach = neighbor->contactDistanceFactor * (s.radius + other.radius);
       return (nearest_image(other.centre, s.centre) - s.centre).squaredNorm() < reach * reach;
     };
     if (shell_cells.any_near(s, gap, [&](std::size_t k) {

@@ -17,7 +17,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261124;  // first number of the state: the format's version
+constexpr double file_mark = 20261125;  // first number of the state: the format's version
 constexpr int header_size = 13;
 constexpr int no_record = -1;
 

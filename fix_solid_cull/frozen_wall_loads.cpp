@@ -6,13 +6,18 @@
 namespace solidcull {
 
 void FrozenWallLoads::book(int body, const WallLoad& load, int sign) {
-  auto& elements = bodies_[body];
+  Elements& elements = bodies_[body];
+  book(elements, load, sign);
+  if (elements.empty()) bodies_.erase(body);
+  book(all_, load, sign);
+}
+
+void FrozenWallLoads::book(Elements& elements, const WallLoad& load, int sign) {
   Element& e = elements[{load.mesh, load.element}];
   e.granules += sign;
   e.force += sign * load.force;
   e.torque += sign * load.torque;
   if (e.granules == 0) elements.erase({load.mesh, load.element});  // with it what rounding has left
-  if (elements.empty()) bodies_.erase(body);
 }
 
 void FrozenWallLoads::add(std::int64_t tag, int body, const std::vector<WallLoad>& loads) {

@@ -27,6 +27,7 @@ class FrozenWallLoads {
     double share = 0;  ///< of what presses on the body from elsewhere: the part that this element bears, see share_out()
   };
   using Place = std::pair<int, int>;  // mesh, element
+  using Elements = std::map<Place, Element>;
 
   /// The granule of this body is put away with these loads (none: nothing happens).
   void add(std::int64_t tag, int body, const std::vector<WallLoad>& loads);
@@ -42,8 +43,9 @@ class FrozenWallLoads {
   bool holds(int body) const { return bodies_.count(body) != 0; }
   Vec3 force(int body) const;  ///< of all walls on the stored granules of this body (N)
 
-  /// Weights by which the walls bear a load on the body (N) in addition to what is frozen: each as much as it bears along that line
-  /// already. What pushes against the load pushes more, what pushes along with it less. Returns their sum on this rank; share_out() then divides by the sum over all ranks.
+  /// Weights by which the walls bear a load on the body (N) in addition to what is frozen: each as much as it bears along that
+  /// line already. What pushes against the load pushes more, what pushes along with it less. Returns their sum on this rank;
+  /// share_out() then divides by the sum over all ranks.
   double weigh(int body, const Vec3& load);
   void share_out(int body, double sum);
 
@@ -52,6 +54,14 @@ class FrozenWallLoads {
     for (const auto& body : bodies_)
       for (const auto& e : body.second) visit(body.first, e.first.first, e.first.second, e.second);
   }
+  /// Those that bear a body.
+  const Elements& of(int body) const {
+    static const Elements none;
+    const auto found = bodies_.find(body);
+    return found == bodies_.end() ? none : found->second;
+  }
+  /// Summed over all bodies; without shares.
+  const Elements& of_all() const { return all_; }
   std::size_t memory_bytes() const;
 
  private:
@@ -61,8 +71,10 @@ class FrozenWallLoads {
   };
   static constexpr int none = -1;
   void book(int body, const WallLoad& load, int sign);
+  static void book(Elements& elements, const WallLoad& load, int sign);
 
-  std::map<int, std::map<Place, Element>> bodies_;
+  std::map<int, Elements> bodies_;
+  Elements all_;        // what a step asks for must not go with the number of bodies
   FlatMap<int> heads_;  // tag -> first entry
   std::vector<Entry> entries_;
   int free_ = none;

@@ -31,6 +31,7 @@ struct ShellEntry {
   int walls = 0;                 ///< walls and triangles touched at the last look
   bool wall_moves = false;       ///< one of them can move
   bool stands = false;           ///< one of them stands still
+  double wall_slip = 0;          ///< largest velocity of its surface at one of them at the last look (m/s)
   bool wall_near = true;         ///< within the skin of a wall; true until a look has seen that it is not
   bool moving_wall_near = true;  ///< of one that can move; likewise
   std::int64_t came_back = -1;   ///< step in which it came out of the store

@@ -136,6 +136,7 @@ int SolidBodies::merge(int a, int b, Vec3 shift) {
     const double share = gone.mass.mass / (kept.mass.mass + gone.mass.mass);
     kept.felt += share * (kept.pose.turned_to_frame(gone.pose.turned_to_world(gone.felt)) - kept.felt);
   }
+  kept.change_then += kept.pose.turned_to_frame(gone.pose.turned_to_world(gone.change_then));
   kept.step_then = -1;
   kept.mass.add(kept.pose == gone.pose ? gone.mass : gone.mass.seen_from(gone.pose, kept.pose));
   kept.summed = std::max(kept.summed, kept.mass.count);
@@ -264,6 +265,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       SolidBody& rest = bodies_[body];
       off = rest;  // same frame, same velocity field, same load at locking
       off.mass = MassProperties();
+      off.change_then = Vec3::Zero();
       off.step_then = rest.step_then = -1;
       off.changed = rest.changed = true;
       off.spans = {};

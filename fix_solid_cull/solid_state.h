@@ -45,6 +45,11 @@ struct SolidStateLaw {
   bool still_neighbour(const MovingSphere& a, const MovingSphere& b) const {
     return contact_velocity(a, b).squaredNorm() < drift_share * drift_share * speed * speed;
   }
+  /// It spins beside the other one: where neither presses on the other nothing passes between them, as long as they keep their
+  /// distance.
+  bool spins_beside(const MovingSphere& a, const MovingSphere& b) const {
+    return (b.velocity - a.velocity).squaredNorm() < drift_share * drift_share * speed * speed && !quiet_contact(a, b);
+  }
   /// A fixed body rests in the world: granule at rest in translation and at its surface.
   bool at_rest(const Vec3& velocity, const Vec3& spin, double radius) const {
     return velocity.squaredNorm() < speed * speed && spin.squaredNorm() * radius * radius < speed * speed;

@@ -15,11 +15,19 @@ class WorthWatch {
   static constexpr double interface = 0.7;  ///< and per interface granule
 
   /// At each look at which culling was allowed: what was saved and spent since the last one, over all ranks, and whether anything
-  /// was culled or is. Returns for how many looks culling is to wait, 0 to go on.
-  int judge(double saved, double spent, bool culling) {
+  /// was culled or is. `begins`: most of what is culled from now on is culled at this look; a trial begins with the first such
+  /// look, for what was saved and spent before, waiting for calm, says nothing of it. Returns for how many looks culling is to
+  /// wait, 0 to go on.
+  int judge(double saved, double spent, bool culling, bool begins = false) {
+    culled_ = culled_ || culling;
+    if (begins && !begun_) {
+      begun_ = true;
+      saved_ = spent_ = 0;
+      looks_ = 0;
+      return 0;
+    }
     saved_ = memory * saved_ + saved;
     spent_ = memory * spent_ + spent;
-    culled_ = culled_ || culling;
     if (++looks_ < (culled_ ? trial : idle_trial)) return 0;
     if (spent_ <= saved_) {
       if (looks_ > 4 * pause_) pause_ = 0;
@@ -28,7 +36,7 @@ class WorthWatch {
     pause_ = std::clamp(2 * pause_, shortest, culled_ ? longest : longest_idle);
     saved_ = spent_ = 0;
     looks_ = 0;
-    culled_ = false;
+    culled_ = begun_ = false;
     return pause_;
   }
   /// The longest that it waits where nothing was culled at all: then looking is cheap.
@@ -40,7 +48,7 @@ class WorthWatch {
 
   double saved_ = 0, spent_ = 0;
   int looks_ = 0, pause_ = 0;
-  bool culled_ = false;
+  bool culled_ = false, begun_ = false;
 };
 
 }  // namespace solidcull

@@ -88,6 +88,33 @@ TEST(Scenes, ABedThatSleepsStillWeighsOnItsWalls) {
   EXPECT_LT(lowest(), before - 0.0005) << "nothing follows the floor";
 }
 
+TEST(Scenes, GranulesThatSpinOnTheSpotSleepAndGoOnSpinning) {
+  // 12 that spin about the normal of the floor, each beside one that it does not touch
+  const Bed bed = mesh_bed("asleep");
+  settled(bed);  // writes its floor
+  std::string granules, spins;
+  for (int k = 0; k < 12; ++k) {
+    const double x = 0.003 + 0.007 * (k % 3), y = 0.004 + 0.006 * (k / 3);
+    for (const double beside : {0.0, 0.00261})
+      granules += "create_atoms 1 single " + std::to_string(x + beside) + ' ' + std::to_string(y) + " 0.0013 units box\n";
+    spins += "set atom " + std::to_string(2 * k + 1) + " omegaz 60\n";
+  }
+  Engine e;
+  e.run(head(bed) + "region box block -0.002 0.028 -0.002 0.028 -0.002 0.15 units box\ncreate_box 2 box\nneighbor 0.0004 bin\n" +
+        "neigh_modify delay 0\n" + body(bed) + granules +
+        "set group all diameter 0.0026\nset group all density 2500\nfix integr all nve/sphere\nthermo 100000\n"
+        "thermo_modify norm no\nrun 3000\n" +
+        spins + "fix cull all solid/cull exterior sleep every 50\nrun 1500\n");
+  EXPECT_EQ(f(e, 1), 0);
+  EXPECT_EQ(f(e, 3), 23) << "all but the highest tag";
+  const double weight = 24 * e.state().at(24).mass * 9.81;
+  EXPECT_NEAR(std::abs(e.vector("floor", 3)), weight, 1e-4 * weight);
+  e.run("unfix cull\nrun 0\n");
+  const State s = e.state();
+  ASSERT_EQ(s.size(), 24u);
+  for (int tag = 1; tag <= 24; ++tag) EXPECT_NEAR(s.at(tag).omega[2], tag % 2 ? 60 : 0, 1e-9) << "granule " << tag;
+}
+
 TEST(Scenes, WhatRestsOnAFloorThatIsUnfixedFalls) {
   const Bed bed = mesh_bed("asleep");
   Engine e;

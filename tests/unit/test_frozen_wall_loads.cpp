@@ -31,6 +31,18 @@ std::map<Key, Element> listed(const FrozenWallLoads& loads) {
   loads.for_each([&](int body, int mesh, int element, const Element& e) {
     EXPECT_TRUE(all.emplace(Key{body, mesh, element}, e).second) << "visited twice";
   });
+  std::map<FrozenWallLoads::Place, std::pair<int, Vec3>> sums;
+  for (const auto& [key, e] : all) {
+    auto& sum =
+        sums.emplace(FrozenWallLoads::Place{std::get<1>(key), std::get<2>(key)}, std::make_pair(0, Vec3(0, 0, 0))).first->second;
+    sum.first += e.granules;
+    sum.second += e.force;
+  }
+  EXPECT_EQ(loads.of_all().size(), sums.size());
+  for (const auto& [place, sum] : sums) {
+    EXPECT_EQ(loads.of_all().at(place).granules, sum.first);
+    EXPECT_LE((loads.of_all().at(place).force - sum.second).norm(), 1e-9 * (1 + sum.second.norm()));
+  }
   return all;
 }
 

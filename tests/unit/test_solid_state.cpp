@@ -156,5 +156,17 @@ TEST(SolidStateLaw, who_bears_little_must_be_calm_for_longer) {
   EXPECT_EQ(SolidStateLaw::patience(0, 0), 1);        // no gravity: no scale to tell by
 }
 
+TEST(SolidStateLaw, who_spins_beside_a_neighbour_is_not_in_contact_with_it_as_long_as_neither_comes_nearer) {
+  const SolidStateLaw law{0.01, 0.75, 9.81, 4};
+  const MovingSphere still{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), 1.0};
+  MovingSphere other{Vec3(2.01, 0, 0), Vec3::Zero(), Vec3(0, 0, 0.5), 1.0};
+  EXPECT_TRUE(law.spins_beside(still, other));
+  EXPECT_TRUE(law.spins_beside(other, still));
+  other.velocity = Vec3(-0.001, 0, 0);
+  EXPECT_FALSE(law.spins_beside(still, other)) << "it comes nearer";
+  other.velocity = other.spin = Vec3::Zero();
+  EXPECT_FALSE(law.spins_beside(still, other)) << "at rest they are one solid";
+}
+
 }  // namespace
 }  // namespace solidcull

@@ -122,6 +122,22 @@ TEST(WorthWatch, stops_soon_where_it_paid_for_long_and_pays_no_more) {
   EXPECT_LE(looks, 20) << "of what was saved long ago little counts";
 }
 
+TEST(WorthWatch, does_not_hold_the_wait_for_calm_against_what_is_culled_then) {
+  for (const bool begins : {false, true}) {
+    WorthWatch worth;
+    for (int n = 0; n < 4; ++n) ASSERT_EQ(judged(worth, {10, 800, true}), 0);
+    ASSERT_EQ(worth.judge(10, 800, true, begins), 0);
+    EXPECT_EQ(looks_until_wait(worth, {1000, 500, true}, 1000), begins ? 0 : 1);
+  }
+}
+
+TEST(WorthWatch, a_trial_begins_once) {
+  WorthWatch worth;  // all is culled and woken in turns
+  int looks = 0;
+  while (worth.judge(10, 1000, true, looks % 2 == 0) == 0 && looks < 1000) ++looks;
+  EXPECT_EQ(looks, 6);
+}
+
 TEST(WorthWatch, a_granule_that_is_out_of_the_engine_saves_more_than_one_of_the_shell) {
   EXPECT_GT(WorthWatch::interior, WorthWatch::interface);
   EXPECT_GT(WorthWatch::interface, 0);
