@@ -122,7 +122,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
     int number;
     SolidBody* body;
     bool stands = false;         // grounded, or all bodies are fixed
-    Vec3 change = Vec3::Zero();  // of the load on its interface granules since they were locked (N)
+    Vec3 change = Vec3::Zero();  // if it stands: what its walls must bear beyond what is frozen, for it is in balance (N)
     Vec3 force = Vec3::Zero(),
          torque = Vec3::Zero();  // N and N m about the centre of mass, of the whole body; if it does not stand
     double reach = 0,
@@ -203,6 +203,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void ground_bodies();
   void set_grounded(int body, bool on);
   void ground_one(int body, int i);
+  bool walls_bear(int body) const;
+  std::vector<WallLoad> wall_loads_on(int i);
   void share_out_loads();
   void press_on_walls();
   void find_frame(int body);
@@ -280,7 +282,6 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void leaves_store(std::int64_t tag);
   void make_store();
   std::size_t locked_here() const;
-  void change_of_stored(const StoredGranule& g, int sign);
   bool may_leave_its_walls(const ShellEntry& e) const;
   void restore_all();
   void move_home();
@@ -343,10 +344,9 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   struct Sum {
     Vec3 value = Vec3::Zero();
   };
-  FlatMap<Sum> stored_change_;  // body -> what its stored granules carried of change of load when they went in, summed (N)
-  FlatMap<int> rested_;         // body -> looks in a row at which it was at rest at a wall that stands still
-  FlatMap<Sum> pressed_;        // grounded body -> running mean of what presses on it since it was locked (N)
-  std::set<int> lifting_;       // grounded bodies that the walls might not hold any more
+  FlatMap<int> rested_;    // body -> looks in a row at which it was at rest at a wall that stands still
+  FlatMap<Sum> pressed_;   // grounded body -> running mean of what its walls bear beyond what is frozen (N)
+  std::set<int> lifting_;  // grounded bodies that the walls might not hold any more
   Ledger ledger_;
   std::map<int, InterfaceMesh> meshes_;
   bool meshes_wanted_ = false;

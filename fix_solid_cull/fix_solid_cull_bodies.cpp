@@ -60,7 +60,7 @@ void FixSolidCull::refresh_locked() {
     // what sleeps on the ground and has no atoms costs nothing
     const auto spans = groups_.find(b.first);
     const bool spanning = spans != groups_.end() && std::binary_search(spanning_.begin(), spanning_.end(), spans->second.key);
-    if (b.second.grounded && !spanning && !has_atoms.contains(b.first) && !stored_change_.contains(b.first)) continue;
+    if (b.second.grounded && !spanning && !has_atoms.contains(b.first) && walls_bear(b.first)) continue;
     slot[b.first] = static_cast<int>(active_.size());
     active_.push_back({b.first, &b.second});
     active_.back().stands = stands_still(b.first);
@@ -116,7 +116,7 @@ void FixSolidCull::take_loads() {
       e.fresh = false;
     }
     e.load_change = load - e.reference;
-    if (a.stands) a.change += e.load_change;
+    if (a.stands) a.change += in_world - atom->rmass[i] * g;
     const double tolerance = wake_up_.tolerance(atom->rmass[i], e.normal_load);
     const double square = e.load_change.squaredNorm();
     if (square > e.excess * e.excess * tolerance * tolerance) e.excess = std::sqrt(square) / tolerance;
@@ -125,11 +125,8 @@ void FixSolidCull::take_loads() {
     set(atom->torque[i], Vec3::Zero());
   }
   if (sleeping())
-    for (ActiveBody& a : active_) {
-      if (!a.stands) continue;
-      if (const Sum* stored = stored_change_.find(a.number)) a.change += stored->value;
-      a.change = a.body->pose.turned_to_world(a.change - a.body->change_then);
-    }
+    for (ActiveBody& a : active_)
+      if (a.stands) a.change += wall_loads_.force(a.number) + a.body->mass.mass * g;
   if (moves) sum_over_bodies();
   if (sleeping()) press_on_walls();
 }
@@ -353,12 +350,11 @@ void FixSolidCull::group_bodies() {
 
 void FixSolidCull::follow_loads(int swallowed, int kept) {
   wall_loads_.merge(swallowed, kept);
-  for (FlatMap<Sum>* sums : {&stored_change_, &pressed_})
-    if (const Sum* gone = sums->find(swallowed)) {
-      const Vec3 moved = gone->value;
-      (*sums)[kept].value += moved;
-      sums->erase(swallowed);
-    }
+  if (const Sum* gone = pressed_.find(swallowed)) {
+    const Vec3 moved = gone->value;
+    pressed_[kept].value += moved;
+    pressed_.erase(swallowed);
+  }
   rested_.erase(swallowed);
 }
 
@@ -438,7 +434,7 @@ void FixSolidCull::settle_bodies() {
     body.changed = false;
   }
   if (spanning_.empty()) return;
-  constexpr int columns = 25;
+  constexpr int columns = 26;
   std::vector<double> rows;
   for (auto& [number, body] : bodies_.bodies()) {
     const Group& group = groups_.at(number);
@@ -449,11 +445,12 @@ void FixSolidCull::settle_bodies() {
     rows.insert(rows.end(), p.inertia.data(), p.inertia.data() + 9);
     for (const Vec3& v : {p.velocity, p.spin}) rows.insert(rows.end(), v.data(), v.data() + 3);
     for (const bool s : body.spans) rows.push_back(s);
-    rows.insert(rows.end(), {double(body.grounded), double(body.mass.held)});
+    rows.insert(rows.end(), {double(body.grounded), double(body.mass.held), body.grounded_mass});
   }
   rows = halo_.gather_all(rows);
   std::map<int, std::vector<RigidPart>> parts;
-  std::map<int, std::pair<bool, bool>> ground;  // some part is grounded, some part is held
+  std::map<int, std::pair<bool, bool>> ground;     // some part is grounded, some part is held
+  std::map<int, std::pair<double, double>> stood;  // grounded of itself, mass
   for (std::size_t r = 0; r < rows.size(); r += columns) {
     RigidPart p;
     const int key = static_cast<int>(rows[r]);
@@ -465,6 +462,8 @@ void FixSolidCull::settle_bodies() {
     parts[key].push_back(p);
     ground[key].first |= rows[r + 23] != 0;
     ground[key].second |= rows[r + 24] != 0;
+    stood[key].first += rows[r + 25];
+    stood[key].second += p.mass;
     for (int d = 0; d < 3; ++d) group_spans_[key][d] |= rows[r + 20 + d] != 0;
   }
   for (auto& [number, body] : bodies_.bodies()) {
@@ -472,6 +471,8 @@ void FixSolidCull::settle_bodies() {
     const auto all = parts.find(group.key);
     if (all == parts.end()) continue;
     set_grounded(number, ground[group.key].first && ground[group.key].second);
+    const auto [grounded, all_mass] = stood.at(group.key);
+    if (body.grounded) body.grounded_mass = grounded / all_mass * body.mass.mass;
     SolidBody whole;
     whole.spans = group_spans_[group.key];
     body.motion = RigidMotion(all->second.data(), static_cast<int>(all->second.size()), whole.free_axes());

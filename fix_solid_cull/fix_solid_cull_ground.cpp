@@ -21,8 +21,10 @@ namespace {
 // them then is what they will feel
 constexpr int looks_at_rest = 2;
 constexpr double balance_share = 0.002;
-// what presses on a grounded body since it was locked, in its weight: beyond, the walls might not hold it, and it moves as a
-// rigid body with live contacts at the walls again
+// a body that merges with a grounded one is grounded, but not for long where it is the larger of the two and may still move
+constexpr double grounded_share = 0.5;
+// what a grounded body presses on its walls with beyond what is frozen, in its weight: beyond, the walls might not hold it, and
+// it moves as a rigid body with live contacts at the walls again
 constexpr double along_share = 0.1, against_share = 0.5;
 // interface granules that nothing holds any more go to the store at the next rebuild of the neighbour lists; for this share of
 // all atoms, at once
@@ -30,12 +32,36 @@ constexpr double worth_of_a_build = 0.05;
 
 }  // namespace
 
+/// The walls' frozen loads on this rank's stored granules of the body are in balance with its weight.
+bool FixSolidCull::walls_bear(int body) const {
+  const double mass = bodies_.body(body).mass.mass;
+  return (wall_loads_.force(body) + mass * gravity()).norm() < balance_share * mass * weight_scale_;
+}
+
+/// What walls do to an interface granule that nothing else touches: what meshes that report their load do to it, and the rest.
+std::vector<WallLoad> FixSolidCull::wall_loads_on(int i) {
+  const ShellEntry& e = shell_[i];
+  std::vector<WallLoad> loads = mesh_loads_.of(atom->tag[i]);
+  WallLoad rest;
+  rest.mesh = WallLoad::no_mesh;
+  rest.force = bodies_.pose(e.body).turned_to_world(e.reference + e.load_change) - atom->rmass[i] * gravity();
+  for (const WallLoad& load : loads) rest.force -= load.force;
+  if (rest.force.norm() < 1e-6 * atom->rmass[i] * weight_scale_) return loads;
+  // walls are not told apart, but by the side from which they push most
+  int axis = 0;
+  rest.force.cwiseAbs().maxCoeff(&axis);
+  rest.element = 2 * axis + (rest.force[axis] > 0);
+  loads.push_back(rest);
+  return loads;
+}
+
 bool FixSolidCull::stands_still(int body) const { return !rigid() || bodies_.body(body).grounded; }
 
 void FixSolidCull::set_grounded(int body, bool on) {
   SolidBody& b = bodies_.body(body);
   if (b.grounded == on) return;
   b.grounded = on;
+  b.grounded_mass = on ? b.mass.mass : 0.0;
   if (on && store_->holds(body)) ++clear_version_;
   b.changed = true;
   b.step_then = -1;
@@ -62,8 +88,6 @@ void FixSolidCull::find_frame(int body) {
 void FixSolidCull::ground_one(int body, int i) {
   SolidBody& b = bodies_.body(body);
   ShellEntry& e = shell_[i];
-  e.reference += e.load_change;
-  e.load_change = Vec3::Zero();
   if (b.pose == Pose() || meshes_wanted_) return;
   e.place = b.pose.to_world(e.place);
   e.reference = b.pose.turned_to_world(e.reference);
@@ -80,7 +104,6 @@ void FixSolidCull::forget_body(int body) {
   store_->forget(body);
   rested_.erase(body);
   pressed_.erase(body);
-  stored_change_.erase(body);
   clear_of_walls_.erase(body);
 }
 
@@ -109,6 +132,10 @@ void FixSolidCull::ground_bodies() {
   for (auto& [number, body] : bodies_.bodies()) {
     const bool held = body.mass.held > 0 || spanning_held.count(key_of(number));
     if (body.grounded) {
+      if (rigid() && body.grounded_mass < grounded_share * body.mass.mass) {
+        lifting_.insert(number);
+        continue;
+      }
       const Sum* mean = pressed_.find(number);
       const Vec3* p = mean ? &mean->value : nullptr;
       if (!p && held) continue;
@@ -133,11 +160,6 @@ void FixSolidCull::ground_bodies() {
     }
     if (++rested_[number] < looks_at_rest) continue;
     if (one) ground_one(number, *one);
-    // its walls bear what presses on it by now; what they are handed in addition counts from here
-    const Sum* stored = stored_change_.find(number);
-    body.change_then = stored ? stored->value : Vec3(Vec3::Zero());
-    for (const int i : locked_index_)
-      if (shell_[i].body == number) body.change_then += shell_[i].load_change;
     set_grounded(number, true);
   }
   if (any_rank(locked_index_stale_)) {

@@ -407,7 +407,6 @@ int FixSolidCull::bring_back(std::int64_t tag) {
   const StoredGranule g = store_->take(tag, record);
   ledger_.returned(g);
   wall_loads_.erase(tag, g.body);
-  if (sleeping()) change_of_stored(g, -1);
   const int i = records_.append(record, g.layout);
   ShellEntry& e = shell_[i];
   e = ShellEntry();
@@ -435,12 +434,6 @@ int FixSolidCull::bring_back(std::int64_t tag) {
   return i;
 }
 
-/// What presses on a body since it was locked, of its granules in the store.
-void FixSolidCull::change_of_stored(const StoredGranule& g, int sign) {
-  if (g.load_change.isZero(0)) return;
-  stored_change_[g.body].value += sign * g.load_change;
-}
-
 void FixSolidCull::put_away(int i) {
   clear_map();
   ShellEntry& e = shell_[i];
@@ -466,8 +459,7 @@ void FixSolidCull::put_away(int i) {
     g = GranuleStore::rounded(g);
     g.lock_step = e.lock_step == update->ntimestep ? locked_as_it_was_stored : locked_long_ago;
   }
-  if (e.walls > 0) wall_loads_.add(g.tag, g.body, mesh_loads_.of(g.tag));
-  if (sleeping()) change_of_stored(g, +1);
+  if (e.wall_near && sleeping()) wall_loads_.add(g.tag, g.body, wall_loads_on(i));
   if (stored_at_ != update->ntimestep) {
     stored_at_ = update->ntimestep;
     const bool periodic = domain->xperiodic || domain->yperiodic || domain->zperiodic;  // the place tells which image
@@ -800,9 +792,7 @@ void FixSolidCull::split_bodies() {
           StoredGranule g = store_->get(tag);
           if (store_->frame_of(g.body) == GranuleStore::shared_frame) store_->share(body, true);
           wall_loads_.move(tag, g.body, body);
-          if (sleeping()) change_of_stored(g, -1);
           g.body = body;
-          if (sleeping()) change_of_stored(g, +1);
           store_->move(tag, body, place);
           return;
         }
@@ -969,7 +959,7 @@ void FixSolidCull::thaw_contacts() {
 /// known.
 bool FixSolidCull::may_leave_its_walls(const ShellEntry& e) const {
   if (!e.wall_near) return true;
-  return sleeping() && !e.moving_wall_near && stands_still(e.body) && e.came_back != update->ntimestep && !new_run_;
+  return sleeping() && !e.moving_wall_near && stands_still(e.body) && e.came_back != update->ntimestep && !e.fresh && !new_run_;
 }
 
 void FixSolidCull::store_what_is_deep(bool change) {

@@ -17,7 +17,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261125;  // first number of the state: the format's version
+constexpr double file_mark = 20261126;  // first number of the state: the format's version
 constexpr int header_size = 13;
 constexpr int no_record = -1;
 
@@ -250,7 +250,6 @@ void FixSolidCull::take_up_as_it_was(const Block& b) {
       StoredGranule s = g.stored;
       s.body = number[g.body];
       store_->add(s, g.record, g.length);
-      if (sleeping()) change_of_stored(s, +1);
       ledger_.stored(s);
       know_radius(s.type, s.radius);
     } else {
@@ -315,7 +314,6 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
       s.body = at.body;
       s.load_change = to.pose.turned_to_frame(from.pose.turned_to_world(s.load_change));
       store_->add(s, t.granule->record, t.granule->length);
-      if (sleeping()) change_of_stored(s, +1);
       ledger_.stored(s);
     } else if (i && shell_[*i].body == 0) {
       shell_[*i].body = at.body;

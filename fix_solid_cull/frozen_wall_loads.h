@@ -13,7 +13,8 @@ namespace solidcull {
 
 /// The force of one wall element on one granule. SI units, world frame.
 struct WallLoad {
-  int mesh = 0, element = 0;   ///< the adapter's numbers
+  static constexpr int no_mesh = -1;
+  int mesh = 0, element = 0;   ///< the adapter's numbers; no_mesh: of a wall that reports no load
   Vec3 force = Vec3::Zero();   ///< on the granule (N)
   Vec3 torque = Vec3::Zero();  ///< of that force about the mesh's point of reference (N m)
 };

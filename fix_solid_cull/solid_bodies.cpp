@@ -131,12 +131,12 @@ int SolidBodies::merge(int a, int b, Vec3 shift) {
   }
   for (int d = 0; d < 3; ++d) kept.spans[d] = kept.spans[d] || gone.spans[d];
   kept.grounded = kept.grounded || gone.grounded;
+  kept.grounded_mass += gone.grounded_mass;
   add(kept, gone.part());
   if (kept.felt_known && gone.felt_known) {
     const double share = gone.mass.mass / (kept.mass.mass + gone.mass.mass);
     kept.felt += share * (kept.pose.turned_to_frame(gone.pose.turned_to_world(gone.felt)) - kept.felt);
   }
-  kept.change_then += kept.pose.turned_to_frame(gone.pose.turned_to_world(gone.change_then));
   kept.step_then = -1;
   kept.mass.add(kept.pose == gone.pose ? gone.mass : gone.mass.seen_from(gone.pose, kept.pose));
   kept.summed = std::max(kept.summed, kept.mass.count);
@@ -257,6 +257,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
     std::sort(tags.begin(), tags.end());
     tags.erase(std::unique(tags.begin(), tags.end()), tags.end());
     const bool was_grounded = bodies_[body].grounded;
+    const double grounded_mass = bodies_[body].grounded_mass, whole = bodies_[body].mass.mass;
     for (const std::vector<std::int64_t>& part : parts_that_came_off(
              tags, contacts, [&](std::int64_t tag) { return is_member(tag); },
              [&](std::int64_t tag) { return mass_of(tag).position; })) {
@@ -265,7 +266,6 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       SolidBody& rest = bodies_[body];
       off = rest;  // same frame, same velocity field, same load at locking
       off.mass = MassProperties();
-      off.change_then = Vec3::Zero();
       off.step_then = rest.step_then = -1;
       off.changed = rest.changed = true;
       off.spans = {};
@@ -308,6 +308,9 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       if (was_grounded) stand_still(off);
       off.grounded = was_grounded && off.mass.held > 0;
       rest.grounded = was_grounded && rest.mass.held > 0;
+      const double share = std::min(1.0, grounded_mass / whole);
+      off.grounded_mass = off.grounded ? share * off.mass.mass : 0.0;
+      rest.grounded_mass = rest.grounded ? share * rest.mass.mass : 0.0;
       split_parents_.push_back(body);
     }
     for (const std::int64_t tag : tags) {

@@ -67,7 +67,7 @@ struct SolidBody {
   /// It stands still: what it is given goes to the ground. A body that merges with a grounded one is grounded; of the parts of a
   /// grounded one those are that hold a granule that is held.
   bool grounded = false;
-  Vec3 change_then = Vec3::Zero();  ///< of the loads on this rank's part, from locking to grounding; frame of the body (N)
+  double grounded_mass = 0;  ///< of what was grounded of itself, not by merging with what was (kg)
 
   /// Calls visit(number) with a reference to each number of the state, in one order: to write it to a file and to read it back.
   template <class Visit>
@@ -101,7 +101,7 @@ struct SolidBody {
     visit(step_then);
     vector(acceleration);
     visit(grounded);
-    vector(change_then);
+    visit(grounded_mass);
   }
 
   bool is_one_granule() const { return mass.count == 1 && !spanned; }
