@@ -20,6 +20,7 @@
 #include "neighbor.h"
 #include "output.h"
 #include "region.h"
+#include "release.h"
 #include "update.h"
 
 namespace solidcull {
@@ -182,7 +183,10 @@ void FixSolidCull::change_membership() {
     contacts_.fit();
     bodies_.fit();
   }
-  if (!new_run_ && memory_.too_large()) fit_memory();  // walls keep pointers into the arrays over the setup of a run
+  if (!new_run_) {  // walls keep pointers into the arrays over the setup of a run
+    memory_.fit_bins(store_->size() > 0);
+    if (memory_.too_large()) fit_memory();
+  }
   locked_index_stale_ = true;
   refresh_locked();
   if (rigid()) give_velocities();
@@ -1025,9 +1029,10 @@ void FixSolidCull::store_what_is_deep(bool change) {
 void FixSolidCull::fit_memory() {
   memory_.fit();
   pair_force_.release();
-  const auto empty = [](auto&... scratch) { ((scratch = {}), ...); };
-  empty(chosen_, side_changes_, touches_, joins_, freed_, locked_now_, freed_anywhere_, locked_anywhere_, overdue_, index_of_,
-        locked_index_, locked_slot_, locked_place_, riding_, fresh_contacts_, around_);
+  release(chosen_, side_changes_, touches_, joins_, freed_, locked_now_, freed_anywhere_, locked_anywhere_, overdue_, index_of_,
+          locked_index_, locked_slot_, locked_place_, riding_, fresh_contacts_, fresh_histories_, around_, balls_, halo_foreign_,
+          ghost_body_);
+  locked_before_.shrink_to_fit();
   shell_.resize(atom->nmax);
   shell_.shrink_to_fit();
   index_atoms();
@@ -1061,6 +1066,7 @@ void FixSolidCull::restore_all() {
   halo_.update();
   wake_all_ = true;
   change_membership();
+  memory_.give_bins_back();
   if (store_->size() != 0 || locked_here() != 0 || contacts_.size() != 0)
     broken("a restore of everything left " + std::to_string(store_->size()) + " granules in the store");
 }
