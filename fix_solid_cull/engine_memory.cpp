@@ -21,8 +21,9 @@
 namespace solidcull {
 namespace {
 
-constexpr int worth_the_trouble = 15000;  // atoms: more than the engine adds at once to arrays that were cut to a few
-constexpr int room = 2;                   // times the atoms that are left
+constexpr int worth_the_trouble = 15000;       // atoms: more than the engine adds at once to arrays that were cut to a few
+constexpr std::size_t worth_a_trim = 4 << 20;  // bytes
+constexpr int room = 2;                        // times the atoms that are left
 // bins: as many are not worth the trouble; with fewer atoms than a share of them they become wider, with more than another share
 // they become what they were
 constexpr int bin_style = 1;  // Neighbor::style
@@ -57,7 +58,13 @@ void EngineMemory::fit() {
 
   engine::shrink_lists(*neighbor, *memory, fitting);
   engine::shrink_work_arrays(*neighbor, *atom, *memory);
+}
+
+void EngineMemory::trim(std::size_t freed) {
+  freed_ += freed;
+  if (freed_ < worth_a_trim) return;
   malloc_trim(0);
+  freed_ = 0;
 }
 
 void EngineMemory::fit_bins(bool some_stored) {

@@ -1,6 +1,8 @@
 // After most granules went into the store: the engine's arrays, which only ever grow, are cut to what is left.
 #pragma once
 
+#include <cstddef>
+
 #include "engine_access.h"
 #include "pointers.h"
 
@@ -15,6 +17,8 @@ class EngineMemory : protected LAMMPS_NS::Pointers {
   /// Whether the arrays are far larger than the atoms need.
   bool too_large() const;
   void fit();
+  /// So many bytes more were freed: what lies between living blocks goes back to the system once it is much.
+  void trim(std::size_t freed);
 
   /// The engine fills all bins of the box at each build, some ten for each granule of a bed, atoms or not. While few atoms are
   /// left and some granules are stored, bins are wider, but for those whose width the deck gives. The engine lists pairs by bins,
@@ -24,6 +28,7 @@ class EngineMemory : protected LAMMPS_NS::Pointers {
   void give_bins_back();
 
  private:
+  std::size_t freed_ = 0;  // since the last trim
   bool wide_ = false;
   engine::BinEdges ours_{};  // while they are wide (m)
 };

@@ -439,7 +439,7 @@ void FixSolidCull::check_invariants() {
   for (const auto& [number, sum] : sums) {
     const MassProperties& m = bodies_.body(number).mass;
     if (m.count != sum.count || m.held != sum.held || std::abs(m.mass - sum.mass) > 1e-12 * sum.mass ||
-        (m.centre() - sum.centre()).norm() > 1e-9 * domain->prd[0])
+        (m.centre() - sum.centre()).norm() > 1e-9 * domain->prd[0] + (compact() ? 1e-7 * diameter_ : 0.0))
       broken("body " + std::to_string(number) + " has other mass properties than its granules");
   }
 }
