@@ -440,7 +440,10 @@ void FixSolidCull::check_invariants() {
     const MassProperties& m = bodies_.body(number).mass;
     if (m.count != sum.count || m.held != sum.held || std::abs(m.mass - sum.mass) > 1e-12 * sum.mass ||
         (m.centre() - sum.centre()).norm() > 1e-9 * domain->prd[0] + (compact() ? 1e-7 * diameter_ : 0.0))
-      broken("body " + std::to_string(number) + " has other mass properties than its granules");
+      broken("body " + std::to_string(number) + " has other mass properties than its granules: count " +
+             std::to_string(m.count - sum.count) + ", held " + std::to_string(m.held - sum.held) + ", mass by " +
+             std::to_string((m.mass - sum.mass) / sum.mass * 1e12) + "e-12 of it, centre by " +
+             std::to_string((m.centre() - sum.centre()).norm() / diameter_ * 1e9) + "e-9 d");
   }
 }
 

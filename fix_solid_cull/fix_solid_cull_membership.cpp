@@ -461,7 +461,8 @@ void FixSolidCull::put_away(int i) {
   g.held = e.held;
   if (compact()) {
     g = store_->rounded(g);
-    if (settings_.tolerance_relative == 0) g.normal_load = 0;  // nothing asks for it
+    bodies_.shift(g.body, {g.mass, e.place, g.radius, g.held}, g.position);  // else many small ways add up when they leave
+    if (settings_.tolerance_relative == 0) g.normal_load = 0;                // nothing asks for it
     g.lock_step = e.lock_step == update->ntimestep ? locked_as_it_was_stored : locked_long_ago;
   }
   if (e.walls > 0) wall_loads_.add(g.tag, g.body, mesh_loads_.of(g.tag));

@@ -314,6 +314,7 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
       s.body = at.body;
       s.load_change = to.pose.turned_to_frame(from.pose.turned_to_world(s.load_change));
       s = store_->rounded(s);
+      if (compact()) bodies_.shift(at.body, {s.mass, at.position, s.radius, s.held}, s.position);
       store_->add(s, t.granule->record, t.granule->length);
       if (sleeping()) change_of_stored(s, +1);
       ledger_.stored(s);
