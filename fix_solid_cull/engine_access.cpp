@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "atom.h"
 #include "fix.h"
 #include "fix_contact_history.h"
 #include "fix_insert.h"
@@ -46,6 +47,22 @@ SOLIDCULL_EXPOSE(NeighborAtoms, Neighbor, int, maxatom)
 SOLIDCULL_EXPOSE(HeldPlaces, Neighbor, double**, xhold)
 SOLIDCULL_EXPOSE(HeldRadii, Neighbor, double*, rhold)
 SOLIDCULL_EXPOSE(HeldAtoms, Neighbor, int, maxhold)
+SOLIDCULL_EXPOSE(NeighborBins, Neighbor, int, mbins)
+SOLIDCULL_EXPOSE(NeighborBinHeads, Neighbor, int*, binhead)
+SOLIDCULL_EXPOSE(NeighborMostBins, Neighbor, int, maxhead)
+SOLIDCULL_EXPOSE(NeighborBinsOwn, Neighbor, int, binsizeflag)
+SOLIDCULL_EXPOSE(NeighborBinEdge, Neighbor, double, binsize_user)
+SOLIDCULL_EXPOSE(NeighborNext, Neighbor, int*, bins)
+SOLIDCULL_EXPOSE(NeighborMostNext, Neighbor, int, maxbin)
+using Procedure = void();
+SOLIDCULL_EXPOSE(SortBinHeads, Atom, int*, binhead)
+SOLIDCULL_EXPOSE(SortMostBins, Atom, int, maxbin)
+SOLIDCULL_EXPOSE(SortBinEdge, Atom, double, userbinsize)
+SOLIDCULL_EXPOSE(SortSetup, Atom, Procedure, setup_sort_bins)
+SOLIDCULL_EXPOSE(SortNext, Atom, int*, next)
+SOLIDCULL_EXPOSE(SortPermutation, Atom, int*, permute)
+SOLIDCULL_EXPOSE(SortMostAtoms, Atom, int, maxnext)
+SOLIDCULL_EXPOSE(SameTagAtoms, Atom, int, smax)
 #undef SOLIDCULL_EXPOSE
 
 std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify) { return *(modify.*member(ModifyFixMap())); }
@@ -87,6 +104,44 @@ void shrink_lists(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Memory& memory, int 
   places = nullptr;
   radii = nullptr;
   neighbor.*member(HeldAtoms()) = 0;
+}
+
+void shrink_work_arrays(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_NS::Memory& memory) {
+  const auto renew = [&](int*& array, int& size, const char* name) {
+    if (!array || size <= atom.nmax) return;
+    memory.destroy(array);
+    memory.create(array, atom.nmax, name);
+    size = atom.nmax;
+  };
+  renew(neighbor.*member(NeighborNext()), neighbor.*member(NeighborMostNext()), "bins");
+  renew(atom.sametag, atom.*member(SameTagAtoms()), "atom:sametag");
+  // the engine makes these two when it sorts next
+  memory.destroy(atom.*member(SortNext()));
+  memory.destroy(atom.*member(SortPermutation()));
+  atom.*member(SortNext()) = atom.*member(SortPermutation()) = nullptr;
+  atom.*member(SortMostAtoms()) = 0;
+}
+
+int neighbor_bins(const LAMMPS_NS::Neighbor& neighbor) { return neighbor.*member(NeighborBins()); }
+
+BinEdges bin_edges(const LAMMPS_NS::Neighbor& neighbor, const LAMMPS_NS::Atom& atom) {
+  return {neighbor.*member(NeighborBinsOwn()) ? neighbor.*member(NeighborBinEdge()) : 0.0, atom.*member(SortBinEdge())};
+}
+
+void set_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_NS::Memory& memory, const BinEdges& edges) {
+  neighbor.*member(NeighborBinsOwn()) = edges.neighbor > 0;
+  neighbor.*member(NeighborBinEdge()) = edges.neighbor;
+  atom.*member(SortBinEdge()) = edges.sort;
+  const auto drop = [&](int*& heads, int& size) {
+    memory.destroy(heads);
+    heads = nullptr;
+    size = 0;
+  };
+  drop(neighbor.*member(NeighborBinHeads()), neighbor.*member(NeighborMostBins()));
+  neighbor.setup_bins();
+  if (atom.sortfreq == 0) return;
+  drop(atom.*member(SortBinHeads()), atom.*member(SortMostBins()));
+  (atom.*member(SortSetup()))();
 }
 
 void* next_symbol(const char* mangled) {

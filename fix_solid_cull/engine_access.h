@@ -5,6 +5,7 @@
 #include <string>
 
 namespace LAMMPS_NS {
+class Atom;
 class Fix;
 class FixContactHistory;
 class FixInsert;
@@ -46,6 +47,18 @@ void expect_atoms(LAMMPS_NS::Thermo& thermo, long change);
 void renew_pages(LAMMPS_NS::FixContactHistory& fix, int one_atom, int page);
 /// Empties all neighbour lists and cuts their arrays to so many atoms.
 void shrink_lists(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Memory& memory, int atoms);
+/// Arrays of one number per atom that serve sorting, binning and the atom map, cut to Atom::nmax. Not between the engine's sort
+/// and its neighbour build.
+void shrink_work_arrays(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_NS::Memory& memory);
+/// Edges of the bins in which atoms are listed to find neighbours, and sorted (m); 0: the engine's choice.
+struct BinEdges {
+  double neighbor, sort;
+};
+BinEdges bin_edges(const LAMMPS_NS::Neighbor& neighbor, const LAMMPS_NS::Atom& atom);
+/// Makes the bins anew; none smaller than they have to be. Likewise.
+void set_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_NS::Memory& memory, const BinEdges& edges);
+/// How many bins the neighbour build has on this rank.
+int neighbor_bins(const LAMMPS_NS::Neighbor& neighbor);
 /// The region that an insert/pack or insert/rate fix fills.
 const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::Fix* fix);
 

@@ -3,6 +3,7 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "atom.h"
@@ -20,8 +21,15 @@
 namespace solidcull {
 namespace {
 
-constexpr int worth_the_trouble = 30000;  // atoms
-constexpr int room = 2;                   // times the atoms that are left
+constexpr int worth_the_trouble = 15000;       // atoms: more than the engine adds at once to arrays that were cut to a few
+constexpr std::size_t worth_a_trim = 4 << 20;  // bytes
+constexpr int room = 2;                        // times the atoms that are left
+// bins: as many are not worth the trouble; with fewer atoms than a share of them they become wider, with more than another share
+// they become what they were
+constexpr int bin_style = 1;  // Neighbor::style
+constexpr int few_bins = 100000;
+constexpr double few_atoms = 1.0 / 64, many_atoms = 1.0 / 16;  // per bin as the deck has it
+constexpr double wider_neighbor = 2, wider_sort = 4;           // triangles look at all that is in the bins near them
 
 }  // namespace
 
@@ -49,7 +57,36 @@ void EngineMemory::fit() {
   }
 
   engine::shrink_lists(*neighbor, *memory, fitting);
+  engine::shrink_work_arrays(*neighbor, *atom, *memory);
+}
+
+void EngineMemory::trim(std::size_t freed) {
+  freed_ += freed;
+  if (freed_ < worth_a_trim) return;
   malloc_trim(0);
+  freed_ = 0;
+}
+
+void EngineMemory::fit_bins(bool some_stored) {
+  const double atoms = atom->nlocal + atom->nghost, bins = engine::neighbor_bins(*neighbor);
+  if (wide_) {
+    if (!some_stored || atoms > many_atoms * std::pow(wider_neighbor, 3) * bins) give_bins_back();
+    return;
+  }
+  if (!some_stored || bins < few_bins || atoms > few_atoms * bins || neighbor->style != bin_style) return;
+  const engine::BinEdges now = engine::bin_edges(*neighbor, *atom);
+  if (now.neighbor > 0 || now.sort > 0) return;     // the deck's own
+  const double edge = 0.5 * neighbor->cutneighmax;  // the engine's choice
+  ours_ = {wider_neighbor * edge, wider_sort * edge};
+  engine::set_bin_edges(*neighbor, *atom, *memory, ours_);
+  wide_ = true;
+}
+
+void EngineMemory::give_bins_back() {
+  const engine::BinEdges now = engine::bin_edges(*neighbor, *atom);
+  if (wide_ && now.neighbor == ours_.neighbor && now.sort == ours_.sort)  // else the deck has set its own since
+    engine::set_bin_edges(*neighbor, *atom, *memory, {0, 0});
+  wide_ = false;
 }
 
 }  // namespace solidcull

@@ -442,8 +442,11 @@ void FixSolidCull::check_invariants() {
     // both are sums of so many numbers, in another order
     const double rounding = std::max(1e-12, std::numeric_limits<double>::epsilon() * static_cast<double>(sum.count));
     if (m.count != sum.count || m.held != sum.held || std::abs(m.mass - sum.mass) > rounding * sum.mass ||
-        (m.centre() - sum.centre()).norm() > 1e-9 * domain->prd[0])
-      broken("body " + std::to_string(number) + " has other mass properties than its granules");
+        (m.centre() - sum.centre()).norm() > 1e-9 * domain->prd[0] + (compact() ? 1e-7 * diameter_ : 0.0))
+      broken("body " + std::to_string(number) + " has other mass properties than its granules: count " +
+             std::to_string(m.count - sum.count) + ", held " + std::to_string(m.held - sum.held) + ", mass by " +
+             std::to_string((m.mass - sum.mass) / sum.mass * 1e12) + "e-12 of it, centre by " +
+             std::to_string((m.centre() - sum.centre()).norm() / diameter_ * 1e9) + "e-9 d");
   }
 }
 

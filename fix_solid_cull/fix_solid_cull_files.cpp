@@ -64,11 +64,10 @@ void FixSolidCull::update_meshes() {
     bodies_.for_each_member([&](std::int64_t tag, int body) {
       if (!meshes_.count(body)) members.emplace_back(tag, body);
     });
-    if (compact())
-      store_->for_each([&](const Resident& g) {
-        const int body = bodies_.root(g.body);
-        if (!meshes_.count(body)) members.emplace_back(g.tag, body);
-      });
+    store_->for_each([&](const Resident& g) {
+      const int body = bodies_.root(g.body);
+      if (!meshes_.count(body)) members.emplace_back(g.tag, body);
+    });
     std::sort(members.begin(), members.end());
     for (const auto& m : members) added[m.second].push_back(place(m.first));
   }

@@ -20,6 +20,7 @@
 #include "neighbor.h"
 #include "output.h"
 #include "region.h"
+#include "release.h"
 #include "update.h"
 
 namespace solidcull {
@@ -121,7 +122,9 @@ void FixSolidCull::index_atoms() {
 void FixSolidCull::change_membership() {
   const auto timed = watch_.time(Part::membership);
   if (stored_at_ >= 0 && stored_at_ != update->ntimestep) {
+    const std::size_t before = store_->memory_bytes();
     store_->forget_transient();
+    memory_.trim(before - store_->memory_bytes());
     stored_at_ = -1;
   }
   balls_ = collect_balls();
@@ -186,11 +189,14 @@ void FixSolidCull::change_membership() {
   side_changes_.clear();
   touches_.clear();
   joins_.clear();
-  if (compact()) {
-    contacts_.fit();
-    bodies_.fit();
+  const std::size_t before = contacts_.memory_bytes() + bodies_.member_bytes();
+  contacts_.fit();
+  bodies_.fit();
+  memory_.trim(before - contacts_.memory_bytes() - bodies_.member_bytes());
+  if (!new_run_) {  // walls keep pointers into the arrays over the setup of a run
+    memory_.fit_bins(store_->size() > 0);
+    if (memory_.too_large()) fit_memory();
   }
-  if (!new_run_ && memory_.too_large()) fit_memory();  // walls keep pointers into the arrays over the setup of a run
   locked_index_stale_ = true;
   refresh_locked();
   if (rigid()) give_velocities();
@@ -308,13 +314,13 @@ void FixSolidCull::clear_map() {
 
 void FixSolidCull::make_store() {
   store_ = std::make_unique<GranuleStore>(2 * diameter_, compact() ? GranuleStore::Loads::rounded : GranuleStore::Loads::exact);
+  bodies_.set_elsewhere([this](std::int64_t tag) { return store_->body_of(tag); });
   if (!compact()) return;
   contacts_.set_elsewhere(
       [this](std::int64_t tag, std::vector<std::int64_t>& partners) { contacts_in_store(*store_, bodies_, tag, partners); });
-  bodies_.set_elsewhere([this](std::int64_t tag) { return store_->body_of(tag); });
 }
 
-std::size_t FixSolidCull::locked_here() const { return bodies_.locked() + (compact() ? store_->size() : 0); }
+std::size_t FixSolidCull::locked_here() const { return bodies_.locked() + store_->size(); }
 
 /// From a to the image of b that it touches, in the frame of their body.
 Vec3 FixSolidCull::apart(const Resident& a, const Resident& b) const {
@@ -363,9 +369,10 @@ void FixSolidCull::turn_inner_histories(int body, const Eigen::Matrix3d& by) {
   }
 }
 
-/// A compact store says itself which body a granule is in, and what it touches there; of the histories of those contacts few bits
-/// are kept.
+/// The store says itself which body a granule is in; a compact one also what it touches there, and of the histories of those
+/// contacts few bits are kept.
 void FixSolidCull::entered_store(std::int64_t tag) {
+  bodies_.leave(tag);
   if (!compact()) return;
   const Resident g = *store_->find(tag);
   std::vector<std::int64_t> partners;
@@ -380,12 +387,12 @@ void FixSolidCull::entered_store(std::int64_t tag) {
   });
   if (!tail.empty()) store_->set_tail(tag, tail);
   contacts_.drop(tag, [&](std::int64_t partner) { return store_->contains(partner); });
-  bodies_.leave(tag);
 }
 
 void FixSolidCull::leaves_store(std::int64_t tag) {
-  if (!compact()) return;
   const Resident g = *store_->find(tag);
+  bodies_.take_in(tag, g.body);
+  if (!compact()) return;
   std::vector<double> history(contacts_.width());
   std::vector<std::uint64_t> tail;
   contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) {
@@ -396,7 +403,6 @@ void FixSolidCull::leaves_store(std::int64_t tag) {
     tail.erase(at, at + static_cast<std::ptrdiff_t>(packed_.words()));
     store_->set_tail(partner, tail);
   });
-  bodies_.take_in(tag, g.body);
 }
 
 int FixSolidCull::bring_back(std::int64_t tag) {
@@ -456,7 +462,8 @@ void FixSolidCull::put_away(int i) {
   g.walls = e.walls;
   g.held = e.held;
   if (compact()) {
-    g = GranuleStore::rounded(g);
+    g = store_->rounded(g);
+    bodies_.shift(g.body, {g.mass, e.place, g.radius, g.held}, g.position);  // else many small ways add up when they leave
     g.lock_step = e.lock_step == update->ntimestep ? locked_as_it_was_stored : locked_long_ago;
   }
   if (e.wall_near && sleeping()) wall_loads_.add(g.tag, g.body, wall_loads_on(i));
@@ -1063,14 +1070,16 @@ void FixSolidCull::store_what_is_deep(bool change) {
 }
 
 void FixSolidCull::fit_memory() {
+  const std::size_t atoms_then = static_cast<std::size_t>(atom->nmax);
   memory_.fit();
   pair_force_.release();
-  const auto empty = [](auto&... scratch) { ((scratch = {}), ...); };
-  empty(chosen_, side_changes_, touches_, joins_, freed_, locked_now_, freed_anywhere_, locked_anywhere_, overdue_, index_of_,
-        locked_index_, locked_slot_, locked_place_, riding_, around_);
+  release(chosen_, side_changes_, touches_, joins_, freed_, locked_now_, freed_anywhere_, locked_anywhere_, overdue_, index_of_,
+          locked_index_, locked_slot_, locked_place_, riding_, around_, balls_, halo_foreign_, ghost_body_);
+  locked_before_.shrink_to_fit();
   shell_.resize(atom->nmax);
   shell_.shrink_to_fit();
   index_atoms();
+  memory_.trim(atoms_then * sizeof(ShellEntry));
 }
 
 void FixSolidCull::publish_atom_counts() {
@@ -1104,6 +1113,7 @@ void FixSolidCull::restore_all() {
   halo_.update();
   wake_all_ = true;
   change_membership();
+  memory_.give_bins_back();
   if (store_->size() != 0 || locked_here() != 0 || contacts_.size() != 0)
     broken("a restore of everything left " + std::to_string(store_->size()) + " granules in the store");
 }

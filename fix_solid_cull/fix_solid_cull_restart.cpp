@@ -199,10 +199,7 @@ std::vector<FixSolidCull::Block> FixSolidCull::parse_blocks(const std::vector<do
         s.walls = static_cast<int>(in.whole());
         s.held = g.held;
         s.load_change = in.vector();
-        if (compact()) {
-          s = GranuleStore::rounded(s);
-          s.lock_step = std::min(s.lock_step, locked_long_ago);
-        }
+        if (compact()) s.lock_step = std::min(s.lock_step, locked_long_ago);
         g.record = in.numbers(static_cast<std::size_t>(g.length));
       }
       b.granules.emplace(tag, g);
@@ -249,6 +246,7 @@ void FixSolidCull::take_up_as_it_was(const Block& b) {
     if (g.record) {
       StoredGranule s = g.stored;
       s.body = number[g.body];
+      s = store_->rounded(s);
       store_->add(s, g.record, g.length);
       ledger_.stored(s);
       know_radius(s.type, s.radius);
@@ -313,6 +311,8 @@ void FixSolidCull::take_up(const std::vector<Block>& blocks) {
       s.position = at.position;
       s.body = at.body;
       s.load_change = to.pose.turned_to_frame(from.pose.turned_to_world(s.load_change));
+      s = store_->rounded(s);
+      if (compact()) bodies_.shift(at.body, {s.mass, at.position, s.radius, s.held}, s.position);
       store_->add(s, t.granule->record, t.granule->length);
       ledger_.stored(s);
     } else if (i && shell_[*i].body == 0) {

@@ -28,28 +28,44 @@ std::uint64_t pair_of(int low, int high) {
 /// As the engine packs it.
 std::uint64_t tag_word(std::int64_t tag) { return static_cast<std::uint64_t>(tag); }
 
-/// Two floats in one word.
-std::uint64_t word_of(double low, double high) {
-  const float pair[] = {static_cast<float>(low), static_cast<float>(high)};
-  std::uint64_t word;
-  std::memcpy(&word, pair, sizeof word);
+/// Four numbers in one word.
+std::uint64_t word_of(const std::array<double, 4>& numbers) {
+  std::uint64_t word = 0;
+  for (int k = 0; k < 4; ++k) word |= static_cast<std::uint64_t>(HalfWord::pack(numbers[k])) << 16 * k;
   return word;
 }
-std::array<double, 2> floats_of(std::uint64_t word) {
-  float pair[2];
-  std::memcpy(pair, &word, sizeof word);
-  return {pair[0], pair[1]};
+std::array<double, 4> numbers_of(std::uint64_t word) {
+  std::array<double, 4> numbers;
+  for (int k = 0; k < 4; ++k) numbers[k] = HalfWord::unpack(static_cast<std::uint16_t>(word >> 16 * k));
+  return numbers;
 }
+
+constexpr double steps_per_cell = 1 << 26;  // of a rounded place
 
 }  // namespace
 
-GranuleStore::GranuleStore(double cell, Loads loads) : inverse_cell_(1.0 / cell), loads_(loads) {
+GranuleStore::GranuleStore(double cell, Loads loads)
+    : inverse_cell_(1.0 / cell),
+      step_(cell / steps_per_cell),
+      loads_(loads),
+      slots_(place_field + (loads == Loads::rounded ? FixedPlace::words : sizeof(Vec3) / sizeof(std::uint32_t))) {
   if (!(cell > 0) || !std::isfinite(cell)) throw std::invalid_argument("granule store: the cell size must be positive");
 }
 
-StoredGranule GranuleStore::rounded(StoredGranule granule) {
-  granule.normal_load = static_cast<float>(granule.normal_load);
-  granule.load_change = granule.load_change.cast<float>().cast<double>();
+Vec3 GranuleStore::rounded(const Vec3& place) const {
+  if (loads_ == Loads::exact) return place;
+  std::uint32_t packed[FixedPlace::words];
+  FixedPlace::pack(place, step_, packed);
+  return FixedPlace::unpack(packed, step_);
+}
+
+StoredGranule GranuleStore::rounded(StoredGranule granule) const {
+  if (loads_ == Loads::exact) return granule;
+  granule.position = rounded(granule.position);
+  const auto rounded =
+      numbers_of(word_of({granule.normal_load, granule.load_change[0], granule.load_change[1], granule.load_change[2]}));
+  granule.normal_load = rounded[0];
+  granule.load_change = Vec3(rounded[1], rounded[2], rounded[3]);
   return granule;
 }
 
@@ -60,8 +76,7 @@ auto GranuleStore::head_of_row(const StoredGranule& g, std::size_t tail) const -
     head[5] = bits_of(g.normal_load);
     for (int d = 0; d < 3; ++d) head[6 + d] = bits_of(g.load_change[d]);
   } else {
-    head[5] = word_of(g.normal_load, g.load_change[0]);
-    head[6] = word_of(g.load_change[1], g.load_change[2]);
+    head[5] = word_of({g.normal_load, g.load_change[0], g.load_change[1], g.load_change[2]});
   }
   head[9] = pair_of(g.walls, static_cast<int>(tail << 1) | g.held);
   return head;
@@ -76,11 +91,12 @@ void GranuleStore::add(const StoredGranule& granule, const double* record, int l
     if (i < 0 || i >= length)
       throw std::logic_error("a record of " + std::to_string(length) + " has no word " + std::to_string(i));
 
+  const Vec3 place = rounded(granule.position);
   int s = first_free_;
   if (s == none)
     s = static_cast<int>(slots_.append());
   else
-    first_free_ = slots_[s].next;
+    first_free_ = next_at(s);
 
   const auto head = head_of_row(granule, 0);
   std::vector<std::uint64_t>& row = scratch_;
@@ -98,12 +114,11 @@ void GranuleStore::add(const StoredGranule& granule, const double* record, int l
     }
   }
 
-  Slot& slot = slots_[s];
-  set_position(s, granule.position);
-  slot.tag = tag;
-  slot.body = granule.body;
-  slot.row = rows_.put(row.data(), static_cast<int>(row.size()));
-  join(granule.body, granule.position);
+  set_position(s, place);
+  set_field(s, tag_field, tag);
+  set_field(s, body_field, granule.body);
+  set_row(s, rows_.put(row.data(), static_cast<int>(row.size())));
+  join(granule.body, place);
   seat(s, frame_of(granule.body));
   ++size_;
   index(s);
@@ -115,43 +130,41 @@ StoredGranule GranuleStore::take(std::int64_t tag, std::vector<double>& record) 
   const int s = slot_or_throw(tag);
   const StoredGranule g = granule(s);
   read_record(s, record);
-  transient_.of_tag.erase(slots_[s].tag);
-  unindex(slots_[s].tag);
+  transient_.of_tag.erase(tag_at(s));
+  unindex(tag_at(s));
   unseat(s, frame_of(g.body));
   leave(g.body);
-  rows_.drop(slots_[s].row);
-  slots_[s].tag = free_mark;
-  slots_[s].next = first_free_;
+  rows_.drop(row_at(s));
+  set_field(s, tag_field, free_mark);
+  set_field(s, next_field, first_free_);
   first_free_ = s;
   mass_ -= g.mass;
   if (--size_ == 0) mass_ = ExactSum();
   return g;
 }
 
-Resident GranuleStore::resident(int s) const {
-  return {position(s), number_of(rows_.word_1(slots_[s].row)), slots_[s].tag, slots_[s].body};
-}
+Resident GranuleStore::resident(int s) const { return {position(s), number_of(rows_.word_1(row_at(s))), tag_at(s), body_at(s)}; }
 
 StoredGranule GranuleStore::granule(int s) const {
   std::uint64_t row[record_begin];
-  row[0] = tag_word(slots_[s].tag);
-  rows_.get(slots_[s].row, row, record_begin);
+  row[0] = tag_word(tag_at(s));
+  rows_.get(row_at(s), row, record_begin);
   StoredGranule g;
   g.position = position(s);
   g.radius = number_of(row[1]);
   g.mass = number_of(row[2]);
-  g.tag = slots_[s].tag;
+  g.tag = tag_at(s);
   g.type = static_cast<int>(row[3] & UINT32_MAX);
-  g.body = slots_[s].body;
+  g.body = body_at(s);
   g.layout = static_cast<int>(row[3] >> 32);
   g.lock_step = static_cast<std::int64_t>(row[4]);
   if (loads_ == Loads::exact) {
     g.normal_load = number_of(row[5]);
     g.load_change = Vec3(number_of(row[6]), number_of(row[7]), number_of(row[8]));
   } else {
-    const auto first = floats_of(row[5]), second = floats_of(row[6]);
-    g.normal_load = first[0];
-    g.load_change = Vec3(first[1], second[0], second[1]);
+    const auto loads = numbers_of(row[5]);
+    g.normal_load = loads[0];
+    g.load_change = Vec3(loads[1], loads[2], loads[3]);
   }
   g.walls = static_cast<int>(row[9] & UINT32_MAX);
   g.held = row[9] >> 32 & 1;
@@ -159,10 +172,10 @@ StoredGranule GranuleStore::granule(int s) const {
 }
 
 std::vector<std::uint64_t> GranuleStore::row_of(int s) const {
-  const int length = rows_.length(slots_[s].row);
+  const int length = rows_.length(row_at(s));
   std::vector<std::uint64_t> row(static_cast<std::size_t>(length));
-  row[0] = tag_word(slots_[s].tag);
-  rows_.get(slots_[s].row, row.data(), length);
+  row[0] = tag_word(tag_at(s));
+  rows_.get(row_at(s), row.data(), length);
   return row;
 }
 
@@ -170,7 +183,7 @@ void GranuleStore::read_record(int s, std::vector<double>& out) const {
   const std::vector<std::uint64_t> row = row_of(s);
   out.resize(row.size() - record_begin - tail_of(row));
   if (!out.empty()) std::memcpy(out.data(), row.data() + record_begin, out.size() * sizeof(double));
-  if (const auto* known = transient_.of_tag.find(slots_[s].tag)) {
+  if (const auto* known = transient_.of_tag.find(tag_at(s))) {
     std::size_t word = known->first;
     for (const int i : transient_.indices[known->indices]) out[i] = transient_.words[word++];
   }
@@ -182,8 +195,8 @@ void GranuleStore::change(int s, const StoredGranule& before, const StoredGranul
   std::vector<std::uint64_t> row = row_of(s);
   const auto head = head_of_row(after, tail_of(row));
   std::copy(head.begin() + 1, head.end(), row.begin() + 1);
-  rows_.drop(slots_[s].row);
-  slots_[s].row = rows_.put(row.data(), static_cast<int>(row.size()));
+  rows_.drop(row_at(s));
+  set_row(s, rows_.put(row.data(), static_cast<int>(row.size())));
   mass_ -= before.mass;
   mass_ += after.mass;
 }
@@ -210,8 +223,8 @@ void GranuleStore::set_tail(std::int64_t tag, const std::vector<std::uint64_t>& 
   row.insert(row.end(), tail.begin(), tail.end());
   std::uint64_t& last = row[record_begin - 1];
   last = (last & ((std::uint64_t{1} << 33) - 1)) | static_cast<std::uint64_t>(tail.size()) << 33;
-  rows_.drop(slots_[s].row);
-  slots_[s].row = rows_.put(row.data(), static_cast<int>(row.size()));
+  rows_.drop(row_at(s));
+  set_row(s, rows_.put(row.data(), static_cast<int>(row.size())));
 }
 
 bool GranuleStore::transient_known(std::int64_t tag) const { return transient_.of_tag.contains(narrow_tag(tag)); }
@@ -239,7 +252,7 @@ void GranuleStore::seat(int s, int frame) {
         for (std::int64_t k = c[2] - 1; k <= c[2] + 1; ++k) ++grid.cells[key(i, j, k)].around;
     cell = grid.cells.find(key(c[0], c[1], c[2]));
   }
-  slots_[s].next = cell->head;
+  set_field(s, next_field, cell->head);
   cell->head = s;
   ++grid.granules;
   grid.box.enclose(position(s));
@@ -251,11 +264,11 @@ void GranuleStore::unseat(int s, int frame) {
   const auto c = cell_of(position(s));
   Cell& cell = *grid.cells.find(key(c[0], c[1], c[2]));
   if (cell.head == s) {
-    cell.head = slots_[s].next;
+    cell.head = next_at(s);
   } else {
     int before = cell.head;
-    while (slots_[before].next != s) before = slots_[before].next;
-    slots_[before].next = slots_[s].next;
+    while (next_at(before) != s) before = next_at(before);
+    set_field(before, next_field, next_at(s));
   }
   if (--grid.granules == 0) {
     grids_.erase(found);
@@ -283,13 +296,13 @@ void GranuleStore::leave(int body) {
     bodies_.erase(found);
 }
 
-void GranuleStore::relocate(int s, int body, const Vec3& to) {
-  Slot& slot = slots_[s];
-  const int from = slot.body;
+void GranuleStore::relocate(int s, int body, const Vec3& place) {
+  const Vec3 to = rounded(place);
+  const int from = body_at(s);
   const int old_frame = frame_of(from), new_frame = frame_of(body);
   const bool same_cell = old_frame == new_frame && cell_of(position(s)) == cell_of(to);
   if (!same_cell) unseat(s, old_frame);
-  slot.body = body;
+  set_field(s, body_field, body);
   set_position(s, to);
   if (same_cell)
     grids_.find(new_frame)->second.box.enclose(to);
@@ -340,7 +353,8 @@ std::size_t GranuleStore::index_place(std::int32_t tag) const {
   const std::uint64_t hash = scrambled(static_cast<std::uint64_t>(tag));
   const std::uint32_t slot_mask = (std::uint32_t{1} << slot_bits_) - 1, mark = static_cast<std::uint32_t>(hash) & ~slot_mask;
   std::size_t at = slot_of_hash(hash, index_.size());
-  while (index_[at] != empty_entry && ((index_[at] & ~slot_mask) != mark || slots_[index_[at] & slot_mask].tag != tag))
+  while (index_[at] != empty_entry &&
+         ((index_[at] & ~slot_mask) != mark || tag_at(static_cast<int>(index_[at] & slot_mask)) != tag))
     at = at + 1 == index_.size() ? 0 : at + 1;
   return at;
 }
@@ -363,7 +377,7 @@ void GranuleStore::index(int s) {
     rebuild_index(std::max<std::size_t>(16, index_.size() + index_.size() / 4));
     return;
   }
-  const std::uint64_t hash = scrambled(static_cast<std::uint64_t>(slots_[s].tag));
+  const std::uint64_t hash = scrambled(static_cast<std::uint64_t>(tag_at(s)));
   const std::uint32_t slot_mask = (std::uint32_t{1} << slot_bits_) - 1;
   std::size_t at = slot_of_hash(hash, index_.size());
   while (index_[at] != empty_entry) at = at + 1 == index_.size() ? 0 : at + 1;
@@ -378,7 +392,7 @@ void GranuleStore::unindex(std::int32_t tag) {
   for (std::size_t at = hole;;) {
     at = at + 1 == n ? 0 : at + 1;
     if (index_[at] == empty_entry) break;
-    const std::int32_t other = slots_[index_[at] & slot_mask].tag;
+    const std::int32_t other = tag_at(static_cast<int>(index_[at] & slot_mask));
     if (distance(slot_of_hash(scrambled(static_cast<std::uint64_t>(other)), n), at) < distance(hole, at)) continue;
     index_[hole] = index_[at];
     hole = at;
@@ -397,9 +411,9 @@ void GranuleStore::rebuild_index(std::size_t entries) {
   index_.shrink_to_fit();
   const std::size_t n = index_.size();
   const std::uint32_t slot_mask = (std::uint32_t{1} << slot_bits_) - 1;
-  for (std::size_t s = 0; s < slots_.size(); ++s) {
-    if (slots_[s].tag == free_mark) continue;
-    const std::uint64_t hash = scrambled(static_cast<std::uint64_t>(slots_[s].tag));
+  for (int s = 0; s < static_cast<int>(slots_.size()); ++s) {
+    if (tag_at(s) == free_mark) continue;
+    const std::uint64_t hash = scrambled(static_cast<std::uint64_t>(tag_at(s)));
     std::size_t at = slot_of_hash(hash, n);
     while (index_[at] != empty_entry) at = at + 1 == n ? 0 : at + 1;
     index_[at] = (static_cast<std::uint32_t>(hash) & ~slot_mask) | static_cast<std::uint32_t>(s);
@@ -410,8 +424,8 @@ void GranuleStore::rebuild_index(std::size_t entries) {
 
 double GranuleStore::mass_recounted() const {
   ExactSum sum;
-  for (std::size_t s = 0; s < slots_.size(); ++s)
-    if (slots_[s].tag != free_mark) sum += granule(static_cast<int>(s)).mass;
+  for (int s = 0; s < static_cast<int>(slots_.size()); ++s)
+    if (tag_at(s) != free_mark) sum += granule(static_cast<int>(s)).mass;
   return sum.value();
 }
 

@@ -12,6 +12,7 @@
 
 #include "chunked_array.h"
 #include "exact_sum.h"
+#include "few_bits.h"
 #include "flat_map.h"
 #include "packed_rows.h"
 #include "sphere.h"
@@ -43,15 +44,16 @@ struct Resident {
 
 /// Granules with their engine records (opaque doubles), found by tag in O(1) and by place in O(neighbours). Each body has a grid
 /// of search cells in its own frame, so that a body that moves costs nothing here; bodies that stand still in the world share
-/// one grid, frame 0, so that many small ones cost no more than a large one. Some 85 bytes per granule of a few kinds, 55 to
-/// 70 with rounded loads. Local to the rank.
+/// one grid, frame 0, so that many small ones cost no more than a large one. Some 85 bytes per granule of a few kinds, 45 to
+/// 55 rounded. Local to the rank.
 class GranuleStore {
  public:
   static constexpr int shared_frame = 0;  ///< that of all bodies that share(); any other frame has the number of its body
 
-  /// normal_load and load_change come back to the bit, or rounded to floats, as by rounded().
+  /// All comes back to the bit; or normal_load and load_change are rounded to 0.2 %, and places to 2^-27 of the search cells'
+  /// edge, as by rounded(). A place more than 32,768 cells from the origin of its frame is a std::range_error then.
   enum class Loads { exact, rounded };
-  static StoredGranule rounded(StoredGranule granule);
+  StoredGranule rounded(StoredGranule granule) const;
 
   /// cell: edge of the search cells in m; best near the largest contact distance. Throws std::invalid_argument if not > 0.
   explicit GranuleStore(double cell, Loads loads = Loads::exact);
@@ -66,7 +68,7 @@ class GranuleStore {
   std::optional<Resident> find(std::int64_t tag) const;
   int body_of(std::int64_t tag) const {  ///< 0 if it is not there
     const int s = slot_of(tag);
-    return s == none ? 0 : slots_[s].body;
+    return s == none ? 0 : body_at(s);
   }
   StoredGranule get(std::int64_t tag) const;                      ///< std::logic_error if it is not there
   void record(std::int64_t tag, std::vector<double>& out) const;  ///< likewise
@@ -156,8 +158,8 @@ class GranuleStore {
   /// Calls visit(const Resident&) for all.
   template <class Visit>
   void for_each(Visit visit) const {
-    for (std::size_t s = 0; s < slots_.size(); ++s)
-      if (slots_[s].tag != free_mark) visit(resident(static_cast<int>(s)));
+    for (int s = 0; s < static_cast<int>(slots_.size()); ++s)
+      if (tag_at(s) != free_mark) visit(resident(s));
   }
 
   std::size_t memory_bytes() const;
@@ -171,12 +173,14 @@ class GranuleStore {
   /// words.
   static constexpr int record_begin = 10;
   using Head = std::array<std::uint64_t, record_begin>;
-  struct Slot {
-    std::array<std::uint32_t, 6> place;  // the bits of three doubles: 44 bytes in all, not 48
-    std::int32_t tag = free_mark;
-    std::int32_t next = none;  // next granule in the cell, or next free slot
-    std::int32_t body;
-    PackedRows::Place row;  // everything else, see row_of()
+  /// The words of a slot: 44 or 36 bytes.
+  enum Field {
+    tag_field,
+    next_field,  // next granule in the cell, or next free slot
+    body_field,
+    shape_field,  // with blob_field: the row, everything else
+    blob_field,
+    place_field  // the bits of three doubles, or as FixedPlace packs them
   };
   struct Cell {
     int head = none;
@@ -241,7 +245,7 @@ class GranuleStore {
     }
     if (cells > static_cast<double>(grid.cells.size())) {  // a large box with little in it
       grid.cells.for_each([&](std::int64_t, const Cell& cell) {
-        for (int s = cell.head; s != none; s = slots_[s].next) {
+        for (int s = cell.head; s != none; s = next_at(s)) {
           const auto c = cell_of(position(s));
           if (c[0] >= a[0] && c[1] >= a[1] && c[2] >= a[2] && c[0] <= b[0] && c[1] <= b[1] && c[2] <= b[2]) visit(s);
         }
@@ -252,27 +256,50 @@ class GranuleStore {
       for (std::int64_t j = a[1]; j <= b[1]; ++j)
         for (std::int64_t k = a[2]; k <= b[2]; ++k)
           if (const Cell* cell = grid.cells.find(key(i, j, k)))
-            for (int s = cell->head; s != none; s = slots_[s].next) visit(s);
+            for (int s = cell->head; s != none; s = next_at(s)) visit(s);
   }
   template <class Visit>
   void for_each_slot_of(int body, Visit visit) const {
     const auto found = bodies_.find(body);
     if (found == bodies_.end() || found->second.granules == 0) return;
     for_each_slot_in_box(grids_.at(frame_of(body)), found->second.box.lo, found->second.box.hi, [&](int s) {
-      if (slots_[s].body == body) visit(s);
+      if (body_at(s) == body) visit(s);
     });
   }
   std::vector<int> slots_of(int body) const;
 
+  int field(int s, Field f) const { return static_cast<int>(slots_.row(static_cast<std::size_t>(s))[f]); }
+  void set_field(int s, Field f, int value) { slots_.row(static_cast<std::size_t>(s))[f] = static_cast<std::uint32_t>(value); }
+  std::int32_t tag_at(int s) const { return field(s, tag_field); }
+  int next_at(int s) const { return field(s, next_field); }
+  int body_at(int s) const { return field(s, body_field); }
+  PackedRows::Place row_at(int s) const {
+    const std::uint32_t* slot = slots_.row(static_cast<std::size_t>(s));
+    return {slot[shape_field], slot[blob_field]};
+  }
+  void set_row(int s, PackedRows::Place row) {
+    std::uint32_t* slot = slots_.row(static_cast<std::size_t>(s));
+    slot[shape_field] = row.shape;
+    slot[blob_field] = row.blob;
+  }
   Vec3 position(int s) const {
+    const std::uint32_t* place = slots_.row(static_cast<std::size_t>(s)) + place_field;
+    if (loads_ == Loads::rounded) return FixedPlace::unpack(place, step_);
     Vec3 p;
-    std::memcpy(p.data(), slots_[s].place.data(), sizeof(Slot::place));
+    std::memcpy(p.data(), place, sizeof p);
     return p;
   }
-  void set_position(int s, const Vec3& p) { std::memcpy(slots_[s].place.data(), p.data(), sizeof(Slot::place)); }
+  void set_position(int s, const Vec3& p) {
+    std::uint32_t* place = slots_.row(static_cast<std::size_t>(s)) + place_field;
+    if (loads_ == Loads::rounded)
+      FixedPlace::pack(p, step_, place);
+    else
+      std::memcpy(place, p.data(), sizeof p);
+  }
   Resident resident(int s) const;
   Head head_of_row(const StoredGranule& g, std::size_t tail) const;
   std::vector<std::uint64_t> row_of(int s) const;
+  Vec3 rounded(const Vec3& place) const;
   static std::size_t tail_of(const std::vector<std::uint64_t>& row) { return row[record_begin - 1] >> 33; }
   StoredGranule granule(int s) const;
   void read_record(int s, std::vector<double>& out) const;
@@ -293,12 +320,12 @@ class GranuleStore {
   void unindex(std::int32_t tag);
   void rebuild_index(std::size_t entries);
 
-  double inverse_cell_;
+  double inverse_cell_, step_;
   Loads loads_;
   double largest_radius_ = 0;
   std::size_t size_ = 0;
   ExactSum mass_;
-  ChunkedArray<Slot> slots_;
+  ChunkedArray<std::uint32_t> slots_;
   int first_free_ = none;
   PackedRows rows_;
   std::vector<std::uint64_t> scratch_;  // one row, as it goes in

@@ -6,6 +6,7 @@
 #include "force.h"
 #include "neigh_list.h"
 #include "pair_gran.h"
+#include "release.h"
 #include "update.h"
 
 namespace solidcull {
@@ -40,10 +41,7 @@ Vec3 PairForce::on_first(int i, int j, const double* history) {
                  history ? std::vector<double>(history, history + width) : std::vector<double>(width, 0.0));
 }
 
-void PairForce::release() {
-  const auto empty = [](auto&... rows) { ((rows = {}), ...); };
-  empty(force_rows_, torque_rows_, history_rows_, counts_, neighbour_rows_, flag_rows_);
-}
+void PairForce::release() { solidcull::release(force_rows_, torque_rows_, history_rows_, counts_, neighbour_rows_, flag_rows_); }
 
 Vec3 PairForce::compute(int i, int neighbour, int flag, std::vector<double> history) {
   LAMMPS_NS::Pair* pair = force->pair;

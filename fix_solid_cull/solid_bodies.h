@@ -135,6 +135,13 @@ class SolidBodies {
   void leave(std::int64_t tag) { member_.erase(narrow_tag(tag)); }
   void fit() { member_.fit(); }
 
+  /// One of its granules is somewhere else in it from here on, by so little that the motion stays what it is.
+  void shift(int body, const GranuleMass& granule, const Vec3& to) {
+    MassProperties& sums = bodies_.at(body).mass;
+    sums.add(granule.mass, to, granule.radius, +1, granule.held);
+    sums.add(granule.mass, granule.position, granule.radius, -1, granule.held);
+  }
+
   /// A body as it was (from a restart file), and a granule that was in it. Returns its number.
   int found(const SolidBody& body);
   void take_in(std::int64_t tag, int body) { member_[narrow_tag(tag)] = body; }
