@@ -551,7 +551,10 @@ TEST(SolidBodies, a_body_that_merges_with_a_grounded_one_is_grounded) {
         solid.granules[4].velocity = Vec3(1, 1, 1);
         solid.touch(3, 4);
       }
-      solid.bodies.body(solid.bodies.body_of(large_is_grounded ? 7 : 1)).grounded = true;
+      SolidBody& stood = solid.bodies.body(solid.bodies.body_of(large_is_grounded ? 7 : 1));
+      stood.grounded = true;
+      stood.grounded_mass = stood.mass.mass;
+      const double of_itself = stood.mass.mass;
       if (by_lock)
         solid.lock(4);
       else
@@ -561,6 +564,7 @@ TEST(SolidBodies, a_body_that_merges_with_a_grounded_one_is_grounded) {
       EXPECT_TRUE(body.grounded);
       expect_at_rest(body);
       EXPECT_EQ(body.mass.held, 1);
+      EXPECT_DOUBLE_EQ(body.grounded_mass, of_itself) << "what came to it was not grounded";
     }
 }
 
@@ -595,12 +599,16 @@ TEST(SolidBodies, of_the_parts_of_a_grounded_body_those_are_grounded_that_are_he
       ASSERT_EQ(solid.bodies.size(), 1u);
       const int whole = solid.bodies.body_of(1);
       solid.bodies.body(whole).grounded = was_grounded;
+      solid.bodies.body(whole).grounded_mass = was_grounded ? 0.25 * solid.bodies.body(whole).mass.mass : 0.0;
       solid.unlock({6, 11});
       ASSERT_EQ(solid.bodies.size(), 3u);
       for (int part = 0; part < 3; ++part) {
         const SolidBody& body = solid.bodies.body(solid.bodies.body_of(member[part]));
         EXPECT_EQ(body.mass.held, held_parts >> part & 1);
         EXPECT_EQ(body.grounded, was_grounded && (held_parts >> part & 1)) << "part " << part;
+        // two of fourteen granules left and were not counted
+        EXPECT_NEAR(body.grounded_mass, body.grounded ? 0.25 * 14 / 12 * body.mass.mass : 0.0, 1e-12 * body.mass.mass)
+            << "part " << part;
         expect_at_rest(body);
       }
       expect_right_figures(solid);
@@ -612,6 +620,7 @@ TEST(SolidBodies, the_state_of_a_body_has_what_holds_it) {
   SolidBody body = solid.bodies.body(1), back;
   body.mass.held = 2;
   body.grounded = true;
+  body.grounded_mass = 0.75;
   std::vector<double> numbers;
   body.each_number([&](auto& n) { numbers.push_back(static_cast<double>(n)); });
   std::size_t at = 0;
@@ -622,7 +631,8 @@ TEST(SolidBodies, the_state_of_a_body_has_what_holds_it) {
   EXPECT_EQ(back.mass.mass, body.mass.mass);
   EXPECT_TRUE(back.grounded);
   EXPECT_EQ(numbers[8], 2.0) << "after origin, attitude and count";
-  EXPECT_EQ(numbers.back(), 1.0);
+  EXPECT_EQ(numbers.back(), 0.75);
+  EXPECT_EQ(back.grounded_mass, 0.75);
 }
 
 TEST(SolidBodies, a_member_takes_14_bytes) {
