@@ -19,11 +19,11 @@ struct WakeUpLaw {
                           size_share = 1.0 / 12;  ///< for A = 1: 2.5 % and 25 % at the default tolerance
   static constexpr double small_body = 300;       ///< granules: below, the shares grow, tenfold at most
 
-  static constexpr double own_share = 0.5, least_share = 0.1;
+  static constexpr double own_share = 0.5, least_share = 0.15;
 
   /// Largest load change (N) that a granule of this mass (kg) and normal load at locking (N; below 0: not known) sleeps through:
   /// A weights, but no more than half of what its contacts press with, for at a surface that is less than A weights and a
-  /// granule there would sleep on when its support has gone; no less than a tenth of A weights, and R normal loads on top.
+  /// granule there would sleep on when its support has gone; no less than 15 % of A weights, and R normal loads on top.
   double tolerance(double mass, double normal_load) const {
     const double most = absolute * mass * gravity;
     if (normal_load < 0) return most;
