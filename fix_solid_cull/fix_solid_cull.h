@@ -216,7 +216,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void leave_out_what_is_not_steady();
   bool calm_enough(int i) const;
   void choose_asleep();
-  bool find_calm();
+  std::int64_t find_calm();
   bool can_be_culled(int mask) const;
   void pause_where_bodies_wake();
   std::vector<Vec3> accelerations() const;

@@ -31,6 +31,9 @@ constexpr double worth_share = 0.05;
 constexpr int longest_wait = 10;
 // a granule still stands at a wall that is this share of its radius away, or nearer
 constexpr double wall_still_there = 0.01;
+// where culling waits, so little that is culled is not worth the looks that watch it: it is given back
+// and for so few in solid state no surface is drawn to see how deep they lie
+constexpr double worth_watching = 0.01;
 // looks that culling waits after bodies woke as a whole
 constexpr int shortest_pause = 2, longest_pause = 32;
 // culling that waits comes back when the kinetic energy of what is exterior has fallen to this share
@@ -50,20 +53,22 @@ void FixSolidCull::look() {
   pause_where_bodies_wake();
   come_back_where_it_calmed();
   const bool may_cull = update->ntimestep >= no_cull_until_;
-  bool candidates = false;
+  std::int64_t candidates[2] = {0, atom->nlocal};  // of so many
   joins_.clear();
   if (may_cull)
-    candidates = find_calm();
+    candidates[0] = find_calm();
   else
     for (int i = 0; i < atom->nlocal; ++i)
       if (!shell_[i].locked) shell_[i].calm = 0;
-  const bool any_candidates = any_rank(candidates), any_locked = any_rank(!locked_index_.empty());
+  MPI_Allreduce(MPI_IN_PLACE, candidates, 2, MPI_INT64_T, MPI_SUM, world);
+  const bool some_candidates = static_cast<double>(candidates[0]) > worth_watching * static_cast<double>(candidates[1]);
+  const bool any_locked = any_rank(!locked_index_.empty());
   chosen_.clear();
   if (!needs_surface()) {
     leave_out_what_is_not_steady();
     choose_asleep();
     ground_bodies();
-  } else if (any_candidates || any_locked) {
+  } else if (some_candidates || any_locked) {
     const auto timed_depth = watch_.time(Part::depth);
     follow_with_surface();
     register_with_surface();
@@ -228,7 +233,8 @@ std::vector<Vec3> FixSolidCull::accelerations() const {
   return a;
 }
 
-bool FixSolidCull::find_calm() {
+/// How many are in solid state on this rank.
+std::int64_t FixSolidCull::find_calm() {
   const int owned = atom->nlocal;
   // over a shorter time less motion tells it from rest
   SolidStateLaw law = solid_state_;
@@ -283,7 +289,7 @@ bool FixSolidCull::find_calm() {
       if (j < owned) moving[j] = 1;
     }
   }
-  bool candidates = false;
+  std::int64_t candidates = 0;
   for (int i = 0; i < owned; ++i) {
     ShellEntry& e = shell_[i];
     if (e.locked) continue;
@@ -309,7 +315,7 @@ bool FixSolidCull::find_calm() {
       solid = law.at_rest(vec(atom->v[i]), vec(atom->omega[i]), atom->radius[i]) && law.balanced(acceleration[i], Vec3::Zero());
     }
     e.calm = solid ? e.calm + 1 : 0;
-    candidates = candidates || e.calm >= looks_in_a_row();
+    candidates += e.calm >= looks_in_a_row();
   }
   joins_.clear();
   for (const Pair& p : between_bodies)
@@ -637,6 +643,10 @@ void FixSolidCull::judge_worth(std::int64_t chosen, std::int64_t exterior) {
   if (wait == 0) return;
   no_cull_until_ = std::max(no_cull_until_, update->ntimestep + static_cast<std::int64_t>(wait) * look_every_);
   energy_then_ = kinetic_energy_of_exterior();
+  if (static_cast<double>(counts[0] + counts[1]) < worth_watching * static_cast<double>(exterior) && counts[0] + counts[1] > 0) {
+    wake_all_ = true;
+    ask_for_build(update->ntimestep + 1);
+  }
   if (told_no_worth_ || !worth_.waits_longest()) return;
   told_no_worth_ = true;
   say("fix " + std::string(id) + " solid/cull: among " + std::to_string(exterior) +
