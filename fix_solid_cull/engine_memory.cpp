@@ -24,10 +24,9 @@ namespace {
 constexpr int worth_the_trouble = 15000;       // atoms: more than the engine adds at once to arrays that were cut to a few
 constexpr std::size_t worth_a_trim = 4 << 20;  // bytes
 constexpr int room = 2;                        // times the atoms that are left
-// bins: as many are not worth the trouble; with fewer atoms than a share of them they become wider, with more than another share
-// they become what they were
-constexpr int bin_style = 1;  // Neighbor::style
-constexpr int few_bins = 100000;
+constexpr int bin_style = 1;                   // Neighbor::style
+constexpr int few_bins = 100000;               // so many are not worth the trouble
+// with fewer atoms than a share of the bins these become wider, with more than another share they become what they were
 constexpr double few_atoms = 1.0 / 64, many_atoms = 1.0 / 16;  // per bin as the deck has it
 constexpr double wider_neighbor = 2, wider_sort = 4;           // triangles look at all that is in the bins near them
 

@@ -216,6 +216,16 @@ Vec3 FixSolidCull::gravity() const {
   return g;
 }
 
+void FixSolidCull::refuse_what_lies_too_far() {
+  // twice the way to the farthest corner: places wait in the frames of bodies that may have moved through the box
+  const Vec3 corner = vec(domain->boxlo).cwiseAbs().cwiseMax(vec(domain->boxhi).cwiseAbs());
+  const double far = 2 * corner.norm(), farthest = GranuleStore::farthest * 2 * diameter_;
+  if (far <= farthest) return;
+  char told[64];
+  std::snprintf(told, sizeof told, "%.4g m from the origin, and the box reaches %.4g m", farthest / 2, far / 2);
+  refuse("store compact keeps places up to " + std::string(told) + ": move the origin to the granules, or use store exact");
+}
+
 void FixSolidCull::find_scales() {
   if (diameter_ == 0) {
     double sums[2] = {0, 0};
@@ -242,7 +252,10 @@ void FixSolidCull::find_scales() {
                   settings_.calm};
   wake_up_ = {settings_.tolerance_absolute, settings_.tolerance_relative, weight_scale_, settings_.carve_radius * d,
               settings_.carve_cap};
-  if (!store_) make_store();
+  if (!store_) {
+    if (compact()) refuse_what_lies_too_far();
+    make_store();
+  }
   if (!surface_)
     surface_ = std::make_unique<ImplicitSurface>(
         settings_.voxel * d, closing(), [this](const Vec3& lo, const Vec3& hi, const std::function<void(const Sphere&)>& visit) {

@@ -98,6 +98,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
     }
   }
   void refuse_what_cannot_be_culled();
+  void refuse_what_lies_too_far();
   void find_scales();
   void find_movable();
   Vec3 gravity() const;
@@ -446,7 +447,6 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   bool thawed_ = false;
   bool after_setup_ = false;
   bool new_run_ = false;
-  std::size_t unsorted_ = 0;  // granules freed or locked since the engine last sorted its atoms at our wish
   int interface_group_ = -1;
   WorthWatch worth_;
   std::int64_t judged_at_ = -1;     // step of the last judgement

@@ -313,7 +313,7 @@ void FixSolidCull::clear_map() {
 }
 
 void FixSolidCull::make_store() {
-  store_ = std::make_unique<GranuleStore>(2 * diameter_, compact() ? GranuleStore::Loads::rounded : GranuleStore::Loads::exact);
+  store_ = std::make_unique<GranuleStore>(2 * diameter_, compact() ? GranuleStore::Precision::rounded : GranuleStore::Precision::exact);
   bodies_.set_elsewhere([this](std::int64_t tag) { return store_->body_of(tag); });
   if (!compact()) return;
   contacts_.set_elsewhere(
@@ -1094,11 +1094,8 @@ void FixSolidCull::publish_atom_counts() {
     atom->map_set();
     map_cleared_ = false;
   }
-  unsorted_ += freed_.size() + locked_now_.size();
-  if (atom->sortfreq > 0 && any_rank(static_cast<double>(unsorted_) > sort_share * atom->nlocal)) {
-    atom->nextsort = update->ntimestep;
-    unsorted_ = 0;
-  }
+  const double moved = static_cast<double>(freed_.size() + locked_now_.size());
+  if (any_rank(moved > sort_share * atom->nlocal) && atom->sortfreq > 0) atom->nextsort = update->ntimestep;
   ++membership_version_;
   label_bodies();
 }

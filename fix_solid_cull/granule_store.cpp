@@ -44,23 +44,23 @@ constexpr double steps_per_cell = 1 << 26;  // of a rounded place
 
 }  // namespace
 
-GranuleStore::GranuleStore(double cell, Loads loads)
+GranuleStore::GranuleStore(double cell, Precision precision)
     : inverse_cell_(1.0 / cell),
       step_(cell / steps_per_cell),
-      loads_(loads),
-      slots_(place_field + (loads == Loads::rounded ? FixedPlace::words : sizeof(Vec3) / sizeof(std::uint32_t))) {
+      precision_(precision),
+      slots_(place_field + (precision == Precision::rounded ? FixedPlace::words : sizeof(Vec3) / sizeof(std::uint32_t))) {
   if (!(cell > 0) || !std::isfinite(cell)) throw std::invalid_argument("granule store: the cell size must be positive");
 }
 
 Vec3 GranuleStore::rounded(const Vec3& place) const {
-  if (loads_ == Loads::exact) return place;
+  if (precision_ == Precision::exact) return place;
   std::uint32_t packed[FixedPlace::words];
   FixedPlace::pack(place, step_, packed);
   return FixedPlace::unpack(packed, step_);
 }
 
 StoredGranule GranuleStore::rounded(StoredGranule granule) const {
-  if (loads_ == Loads::exact) return granule;
+  if (precision_ == Precision::exact) return granule;
   granule.position = rounded(granule.position);
   const auto rounded =
       numbers_of(word_of({granule.normal_load, granule.load_change[0], granule.load_change[1], granule.load_change[2]}));
@@ -72,7 +72,7 @@ StoredGranule GranuleStore::rounded(StoredGranule granule) const {
 auto GranuleStore::head_of_row(const StoredGranule& g, std::size_t tail) const -> Head {
   Head head{tag_word(g.tag), bits_of(g.radius), bits_of(g.mass), pair_of(g.type, g.layout),
             static_cast<std::uint64_t>(g.lock_step)};
-  if (loads_ == Loads::exact) {
+  if (precision_ == Precision::exact) {
     head[5] = bits_of(g.normal_load);
     for (int d = 0; d < 3; ++d) head[6 + d] = bits_of(g.load_change[d]);
   } else {
@@ -158,7 +158,7 @@ StoredGranule GranuleStore::granule(int s) const {
   g.body = body_at(s);
   g.layout = static_cast<int>(row[3] >> 32);
   g.lock_step = static_cast<std::int64_t>(row[4]);
-  if (loads_ == Loads::exact) {
+  if (precision_ == Precision::exact) {
     g.normal_load = number_of(row[5]);
     g.load_change = Vec3(number_of(row[6]), number_of(row[7]), number_of(row[8]));
   } else {

@@ -52,11 +52,12 @@ class GranuleStore {
 
   /// All comes back to the bit; or normal_load and load_change are rounded to 0.2 %, and places to 2^-27 of the search cells'
   /// edge, as by rounded(). A place more than 32,768 cells from the origin of its frame is a std::range_error then.
-  enum class Loads { exact, rounded };
+  enum class Precision { exact, rounded };
+  static constexpr double farthest = 32768;  ///< cells
   StoredGranule rounded(StoredGranule granule) const;
 
   /// cell: edge of the search cells in m; best near the largest contact distance. Throws std::invalid_argument if not > 0.
-  explicit GranuleStore(double cell, Loads loads = Loads::exact);
+  explicit GranuleStore(double cell, Precision precision = Precision::exact);
 
   /// Takes a granule in. A tag that is in the store already, or that is no 32-bit number, is a std::logic_error. The words of
   /// the record at the indices `transient` are kept until forget_transient() and are 0.0 afterwards.
@@ -284,14 +285,14 @@ class GranuleStore {
   }
   Vec3 position(int s) const {
     const std::uint32_t* place = slots_.row(static_cast<std::size_t>(s)) + place_field;
-    if (loads_ == Loads::rounded) return FixedPlace::unpack(place, step_);
+    if (precision_ == Precision::rounded) return FixedPlace::unpack(place, step_);
     Vec3 p;
     std::memcpy(p.data(), place, sizeof p);
     return p;
   }
   void set_position(int s, const Vec3& p) {
     std::uint32_t* place = slots_.row(static_cast<std::size_t>(s)) + place_field;
-    if (loads_ == Loads::rounded)
+    if (precision_ == Precision::rounded)
       FixedPlace::pack(p, step_, place);
     else
       std::memcpy(place, p.data(), sizeof p);
@@ -321,7 +322,7 @@ class GranuleStore {
   void rebuild_index(std::size_t entries);
 
   double inverse_cell_, step_;
-  Loads loads_;
+  Precision precision_;
   double largest_radius_ = 0;
   std::size_t size_ = 0;
   ExactSum mass_;

@@ -167,6 +167,12 @@ class DeckRefusals(Case):
         self.refused_by_fix(deck(FIX, "run 0", pair="none").replace("pair_coeff * *\n", ""),
                             "pair_style 'none' is not granular: use pair_style gran")
 
+    def test_compact_store_far_from_the_origin(self):
+        far = deck(FIX + " store compact", "run 0", box="block 200 200.012 0 0.012 -0.001 0.04").replace("single 0.006", "single 200.006")
+        self.refused_by_fix(far, "store compact keeps places up to 98.3 m from the origin, and the box reaches 200 m: "
+                                 "move the origin to the granules, or use store exact")
+        self.accepted(far.replace(" store compact", ""))
+
     def test_run_style(self):
         self.refused_by_fix(deck(FIX, "run_style respa 2 2", "run 0"), "run_style 'respa' is not supported: use run_style verlet")
 

@@ -26,7 +26,7 @@ struct Packing {
   std::map<std::int64_t, StoredGranule> granules;  // stored or not
   Vec3 periods = Vec3::Zero();
 
-  explicit Packing(double cell) : store(cell, GranuleStore::Loads::rounded) {
+  explicit Packing(double cell) : store(cell, GranuleStore::Precision::rounded) {
     contacts.set_layout(std::vector<bool>(6, true));
     contacts.set_elsewhere(
         [this](std::int64_t tag, std::vector<std::int64_t>& partners) { contacts_in_store(store, bodies, tag, partners); });
@@ -290,7 +290,7 @@ TEST(ContactsInStore, a_granule_of_a_few_kinds_takes_no_more_than_68_bytes_in_al
 }
 
 TEST(ContactsInStore, loads_are_rounded_by_less_than_a_five_hundredth) {
-  const GranuleStore store(1.0, GranuleStore::Loads::rounded);
+  const GranuleStore store(1.0, GranuleStore::Precision::rounded);
   StoredGranule g = granule(1, 1, Vec3::Zero(), 0.5);
   g.normal_load = 0.123456789123;
   g.load_change = Vec3(1e-7, -0.3, 12.3456789);
@@ -304,7 +304,7 @@ TEST(ContactsInStore, loads_are_rounded_by_less_than_a_five_hundredth) {
 }
 
 TEST(ContactsInStore, a_place_that_a_compact_store_cannot_tell_is_refused_and_nothing_is_changed) {
-  GranuleStore store(1.0, GranuleStore::Loads::rounded);
+  GranuleStore store(1.0, GranuleStore::Precision::rounded);
   EXPECT_THROW(store.add(granule(1, 1, Vec3(0, 40000, 0), 0.5), nullptr, 0), std::range_error);
   EXPECT_EQ(store.size(), 0u);
   EXPECT_FALSE(store.contains(1));

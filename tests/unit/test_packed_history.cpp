@@ -115,7 +115,7 @@ TEST(PackedHistory, each_is_found_by_its_partner) {
 }
 
 TEST(PackedHistory, the_store_keeps_them_with_a_granule_and_lets_its_record_be) {
-  GranuleStore store(1.0, GranuleStore::Loads::rounded);
+  GranuleStore store(1.0, GranuleStore::Precision::rounded);
   std::vector<double> record = {1.5, 2.5, 3.5, 4.5}, back;
   for (int tag = 1; tag <= 100; ++tag) {
     StoredGranule g;
