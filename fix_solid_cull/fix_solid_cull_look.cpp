@@ -26,13 +26,12 @@ constexpr double drawn_share = 0.25;
 // a wall closer than this share of a granule's radius closes the implicit surface behind itself
 constexpr double wall_closes = 0.2;
 // culling costs a rebuild of the neighbour lists: it waits for one that comes anyway, until it takes this share of the exterior
-// granules, or until a granule has waited for that many looks
+// granules, or until a granule has waited for that many looks; where nothing is culled it is not even asked where fewer would lie
 constexpr double worth_share = 0.05;
 constexpr int longest_wait = 10;
 // a granule still stands at a wall that is this share of its radius away, or nearer
 constexpr double wall_still_there = 0.01;
 // where culling waits, so little that is culled is not worth the looks that watch it: it is given back
-// and for so few in solid state no surface is drawn to see how deep they lie
 constexpr double worth_watching = 0.01;
 // looks that culling waits after bodies woke as a whole
 constexpr int shortest_pause = 2, longest_pause = 32;
@@ -46,13 +45,14 @@ constexpr int quick = 5, quick_calm = 3;
 
 void FixSolidCull::look() {
   const auto timed = watch_.time(Part::look);
-  see_walls(false);
+  const bool any_culled = any_rank(!locked_index_.empty() || store_->size() > 0);
   const Vec3 g = gravity();
   watch_effective_gravity(false);
   gravity_then_ = g;
   pause_where_bodies_wake();
   come_back_where_it_calmed();
   const bool may_cull = update->ntimestep >= no_cull_until_;
+  if (may_cull || any_culled) see_walls(false);
   std::int64_t candidates[2] = {0, atom->nlocal};  // of so many
   joins_.clear();
   if (may_cull)
@@ -61,22 +61,22 @@ void FixSolidCull::look() {
     for (int i = 0; i < atom->nlocal; ++i)
       if (!shell_[i].locked) shell_[i].calm = 0;
   MPI_Allreduce(MPI_IN_PLACE, candidates, 2, MPI_INT64_T, MPI_SUM, world);
-  const bool some_candidates = static_cast<double>(candidates[0]) > worth_watching * static_cast<double>(candidates[1]);
-  const bool any_locked = any_rank(!locked_index_.empty());
+  const bool some_candidates =
+      candidates[0] > 0 && static_cast<double>(candidates[0]) >= worth_share * static_cast<double>(candidates[1]);
   chosen_.clear();
-  if (!needs_surface()) {
+  if (!some_candidates && !any_culled) {
+    leave_out_what_is_not_steady();
+  } else if (!needs_surface()) {
     leave_out_what_is_not_steady();
     choose_asleep();
     ground_bodies();
-  } else if (some_candidates || any_locked) {
+  } else {
     const auto timed_depth = watch_.time(Part::depth);
     follow_with_surface();
     register_with_surface();
     choose();
     leave_out_what_is_not_steady();
     find_exposed();
-  } else {
-    leave_out_what_is_not_steady();
   }
   if (any_rank(!chosen_.empty())) prepare_locking();
   std::int64_t counts[3] = {static_cast<std::int64_t>(chosen_.size()), 0, 0};
@@ -647,7 +647,7 @@ void FixSolidCull::judge_worth(std::int64_t chosen, std::int64_t exterior) {
     wake_all_ = true;
     ask_for_build(update->ntimestep + 1);
   }
-  if (told_no_worth_ || !worth_.waits_longest()) return;
+  if (told_no_worth_ || !worth_.waits_long()) return;
   told_no_worth_ = true;
   say("fix " + std::string(id) + " solid/cull: among " + std::to_string(exterior) +
       " granules too few can be culled for it to pay; trying again every " + std::to_string(wait * look_every_) +

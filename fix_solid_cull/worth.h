@@ -39,12 +39,12 @@ class WorthWatch {
     culled_ = begun_ = false;
     return pause_;
   }
-  /// The longest that it waits where nothing was culled at all: then looking is cheap.
-  bool waits_longest() const { return pause_ >= longest_idle; }
+  /// The deck hardly lets anything be culled: worth a line.
+  bool waits_long() const { return pause_ >= worth_a_line; }
 
  private:
   static constexpr double memory = 0.9;  // of earlier looks
-  static constexpr int trial = 6, idle_trial = 4, shortest = 4, longest_idle = 16, longest = 256;
+  static constexpr int trial = 6, idle_trial = 4, shortest = 4, longest_idle = 64, longest = 256, worth_a_line = 16;
 
   double saved_ = 0, spent_ = 0;
   int looks_ = 0, pause_ = 0;

@@ -38,7 +38,7 @@ std::vector<int> waits(WorthWatch& worth, const Look& look, int count) {
 TEST(WorthWatch, goes_on_for_ever_where_it_pays) {
   WorthWatch worth;
   EXPECT_EQ(looks_until_wait(worth, pays, 10000), 0);
-  EXPECT_FALSE(worth.waits_longest());
+  EXPECT_FALSE(worth.waits_long());
 }
 
 TEST(WorthWatch, goes_on_where_it_costs_what_it_saves) {
@@ -61,13 +61,13 @@ TEST(WorthWatch, waits_twice_as_long_each_time_up_to_the_longest) {
 
 TEST(WorthWatch, waits_less_long_where_nothing_can_be_culled) {
   WorthWatch worth;
-  EXPECT_EQ(waits(worth, idles, 5), (std::vector<int>{4, 8, 16, 16, 16}));
+  EXPECT_EQ(waits(worth, idles, 7), (std::vector<int>{4, 8, 16, 32, 64, 64, 64}));
 }
 
 TEST(WorthWatch, does_not_keep_the_long_wait_once_nothing_is_culled_any_more) {
   WorthWatch worth;
   EXPECT_EQ(waits(worth, loses, 7).back(), 256);
-  EXPECT_EQ(waits(worth, idles, 2), (std::vector<int>{16, 16}));
+  EXPECT_EQ(waits(worth, idles, 2), (std::vector<int>{64, 64}));
 }
 
 TEST(WorthWatch, one_look_at_which_something_was_culled_makes_the_whole_trial_one_of_culling) {
@@ -76,16 +76,16 @@ TEST(WorthWatch, one_look_at_which_something_was_culled_makes_the_whole_trial_on
   EXPECT_EQ(looks_until_wait(worth, idles, 1000), 5);
 }
 
-TEST(WorthWatch, says_when_it_waits_as_long_as_where_nothing_is_culled) {
+TEST(WorthWatch, is_worth_a_line_from_16_looks_on) {
   for (const Look& look : {idles, loses}) {
     WorthWatch worth;
-    EXPECT_FALSE(worth.waits_longest());
+    EXPECT_FALSE(worth.waits_long());
     EXPECT_EQ(waits(worth, look, 2).back(), 8);
-    EXPECT_FALSE(worth.waits_longest());
+    EXPECT_FALSE(worth.waits_long());
     EXPECT_EQ(waits(worth, look, 1).back(), 16);
-    EXPECT_TRUE(worth.waits_longest());
+    EXPECT_TRUE(worth.waits_long());
     waits(worth, look, 2);
-    EXPECT_TRUE(worth.waits_longest());
+    EXPECT_TRUE(worth.waits_long());
   }
 }
 
