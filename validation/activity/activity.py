@@ -3,8 +3,8 @@
 
     validation/activity/activity.py [scene ...] [--runs N] [--fix KEYWORDS] [--check] [--few-steps]
 
-Makes the beds once (out/*.restart), runs each scene's deck N times unculled (1e-5 d apart: the noise floor) and N times culled,
-in turns, prints a table per scene and leaves all figures in out/SCENE.json. A culled figure is good within the larger of 2 % and
+Makes the beds once (out/*.restart), runs each scene's deck N times unculled (granules 1e-5 d apart, tools 10 um: the noise floor)
+and N times culled, in turns, prints a table per scene and leaves all figures in out/SCENE.json. A culled figure is good within the larger of 2 % and
 the noise floor of the unculled mean; a check has the bar beside it. Exit: 0 nothing lost, 1 a granule lost, 2 a run failed;
 with --strict 1 also when a figure is outside its margin.
 """
@@ -32,6 +32,7 @@ GRAVITY = 9.81
 DIAMETER = 0.00275                               # m: mean, of the beds that wake
 TRAY, HALL = (0.15, 0.06), (0.06, 0.06)          # m: L and W of the beds that wake
 CELL = 0.0005                                    # m, of the height map
+ASIDE = [k * 1e-5 for k in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5)]  # m: the place of a tool in each run
 HARM = 1.02                                      # loop time culled over unculled that is allowed where nothing rests
 FELL = 0.5                                       # mean diameters: what has sunk by more has fallen
 
@@ -206,12 +207,12 @@ def map_check(runs, start, size):
 
 # --- runs -----------------------------------------------------------------------------------------------------------
 
-def compare(part, deck, figures, variables, runs=None):
-    """twin's comparison of one deck; `figures(run)` gives its metrics."""
+def compare(part, deck, figures, variables, runs=None, vary=None):
+    """twin's comparison of one deck; `figures(run)` gives its metrics. `vary`: a variable and its value in each run."""
     n = runs or options.runs
     given = {**variables, **({"keywords": options.fix} if options.fix else {})}
     return twin.compare(HERE / deck, (), LAUNCHER, results() / part, unculled=n, culled=n, variables=given, extra=figures,
-                        say=lambda line: print(f"  {part}: {line}", flush=True))
+                        vary=vary, say=lambda line: print(f"  {part}: {line}", flush=True))
 
 
 def report(scene, parts, checks=(), notes=()):
@@ -245,7 +246,7 @@ def blade():
 
     start = results() / "blade-start.dump"
     result, runs = compare("blade", "blade.in", figures, {"restart": tray_bed(), "start_dump": start.relative_to(HERE),
-                                                          **short(before=100, dip=0.001, path=0.0005)})
+                                                          **short(before=100, dip=0.001, path=0.0005)}, vary=("aside", ASIDE))
     return report("blade", {"blade": result}, map_check(runs, start, TRAY))
 
 
@@ -258,7 +259,7 @@ def lower():
 
     start = results() / "lower-start.dump"
     result, runs = compare("lower", "lower.in", figures, {"restart": tray_bed(), "start_dump": start.relative_to(HERE),
-                                                          **short(before=100, depth=0.0005, hold=200, after=200)})
+                                                          **short(before=100, depth=0.0005, hold=200, after=200)}, vary=("aside", ASIDE))
     return report("lower", {"lower": result}, map_check(runs, start, TRAY))
 
 
@@ -380,8 +381,8 @@ def main(argv=None):
     p.add_argument("--strict", action="store_true", help="a figure outside its margin counts")
     p.add_argument("--few-steps", action="store_true", help="every deck for a few steps, one run of each")
     options = p.parse_args(argv)
-    if not 1 <= options.runs <= len(twin.SEEDS):
-        p.error(f"--runs takes 1 to {len(twin.SEEDS)}")
+    if not 1 <= options.runs <= len(ASIDE):
+        p.error(f"--runs takes 1 to {len(ASIDE)}")
     if options.few_steps:
         options.runs = 1
     if options.check:
