@@ -248,8 +248,7 @@ void FixSolidCull::find_scales() {
   const double d = diameter_;
   look_every_ = settings_.every ? settings_.every : look_interval(d, weight_scale_, update->dt);
   solid_state_ = {settings_.speed * std::sqrt(weight_scale_ * d),
-                  SolidStateLaw::out_of_balance_share * std::max(settings_.tolerance_absolute, 1.0), weight_scale_,
-                  settings_.calm};
+                  SolidStateLaw::out_of_balance_share * std::max(settings_.tolerance_absolute, 1.0), weight_scale_};
   wake_up_ = {settings_.tolerance_absolute, settings_.tolerance_relative, weight_scale_, settings_.carve_radius * d,
               settings_.carve_cap};
   if (!store_) {

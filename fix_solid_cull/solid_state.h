@@ -23,7 +23,6 @@ struct SolidStateLaw {
   double speed;    ///< largest relative velocity at a contact, and in a fixed body of the granule itself (m/s)
   double force;    ///< largest out-of-balance force in granule weights
   double gravity;  ///< |g| in m/s^2
-  int looks;       ///< looks in a row
   static constexpr double gap = 0.01;                   ///< touching within this share of the radii's sum counts as contact
   static constexpr double drift_share = 0.05;           ///< of `speed`, for granules without a loaded contact
   static constexpr double out_of_balance_share = 0.25;  ///< of the wake-up tolerance A

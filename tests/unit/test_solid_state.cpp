@@ -74,7 +74,7 @@ TEST(ContactVelocity, does_not_see_a_spin_about_the_line_of_centres) {
   EXPECT_EQ(contact_velocity(a, b), Vec3(Vec3::Zero()));
 }
 
-const SolidStateLaw law{0.01, 1.5, 10.0, 3};
+const SolidStateLaw law{0.01, 1.5, 10.0};
 
 TEST(SolidStateLaw, a_contact_is_quiet_below_the_speed) {
   const MovingSphere a{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), 1.0};
@@ -157,7 +157,7 @@ TEST(SolidStateLaw, who_bears_little_must_be_calm_for_longer) {
 }
 
 TEST(SolidStateLaw, who_spins_beside_a_neighbour_is_not_in_contact_with_it_as_long_as_neither_comes_nearer) {
-  const SolidStateLaw law{0.01, 0.75, 9.81, 4};
+  const SolidStateLaw law{0.01, 0.75, 9.81};
   const MovingSphere still{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), 1.0};
   MovingSphere other{Vec3(2.01, 0, 0), Vec3::Zero(), Vec3(0, 0, 0.5), 1.0};
   EXPECT_TRUE(law.spins_beside(still, other));
