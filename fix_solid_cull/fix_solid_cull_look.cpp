@@ -26,12 +26,13 @@ constexpr double drawn_share = 0.25;
 // a wall closer than this share of a granule's radius closes the implicit surface behind itself
 constexpr double wall_closes = 0.2;
 // culling costs a rebuild of the neighbour lists: it waits for one that comes anyway, until it takes this share of the exterior
-// granules, or until a granule has waited for that many looks; where nothing is culled it is not even asked where fewer would lie
+// granules, or until a granule has waited for that many looks; where nothing is culled no surface is drawn for fewer
 constexpr double worth_share = 0.05;
 constexpr int longest_wait = 10;
 // a granule still stands at a wall that is this share of its radius away, or nearer
 constexpr double wall_still_there = 0.01;
-// where culling waits, so little that is culled is not worth the looks that watch it: it is given back
+// where culling waits, so little that is culled is not worth the looks that watch it: it is given back; where nothing is culled,
+// so few in solid state are left alone
 constexpr double worth_watching = 0.01;
 // looks that culling waits after bodies woke as a whole
 constexpr int shortest_pause = 2, longest_pause = 32;
@@ -61,8 +62,8 @@ void FixSolidCull::look() {
     for (int i = 0; i < atom->nlocal; ++i)
       if (!shell_[i].locked) shell_[i].calm = 0;
   MPI_Allreduce(MPI_IN_PLACE, candidates, 2, MPI_INT64_T, MPI_SUM, world);
-  const bool some_candidates =
-      candidates[0] > 0 && static_cast<double>(candidates[0]) >= worth_share * static_cast<double>(candidates[1]);
+  const double few = (needs_surface() ? worth_share : worth_watching) * static_cast<double>(candidates[1]);
+  const bool some_candidates = candidates[0] > 0 && static_cast<double>(candidates[0]) >= few;
   chosen_.clear();
   if (!some_candidates && !any_culled) {
     leave_out_what_is_not_steady();
