@@ -34,6 +34,7 @@ struct HalfWord {
 /// A place in four words of 32 bits: three numbers of 42 bits, in multiples of `step`.
 struct FixedPlace {
   static constexpr int words = 4;
+  static constexpr double half = 2199023255552.0;  ///< 2^41: steps
   /// Throws std::range_error for a place farther out than 2^41 steps.
   static void pack(const Vec3& place, double step, std::uint32_t* to) {
     std::uint64_t n[3];
@@ -55,9 +56,6 @@ struct FixedPlace {
     }
     return place;
   }
-
- private:
-  static constexpr double half = 2199023255552.0;  // 2^41
 };
 
 }  // namespace solidcull

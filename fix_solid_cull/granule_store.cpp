@@ -41,6 +41,7 @@ std::array<double, 4> numbers_of(std::uint64_t word) {
 }
 
 constexpr double steps_per_cell = 1 << 26;  // of a rounded place
+static_assert(GranuleStore::farthest * steps_per_cell == FixedPlace::half);
 
 }  // namespace
 

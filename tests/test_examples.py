@@ -33,6 +33,12 @@ class Decks(unittest.TestCase):
             self.copied("falling_mass", folder)
             self.run_deck(folder, "make.in", granules=500, pullsteps=2000, dampsteps=300, fadesteps=300, reststeps=100)
             self.good(self.run_deck(folder, "fall.in", frames=2, perframe=200))
+            deck = subprocess.run(["/usr/bin/python3", "-c", "import moving; print(moving.deck())"], cwd=ROOT / "examples" / "falling_mass",
+                                  stdout=subprocess.PIPE, check=True, text=True).stdout
+            (Path(folder) / "moving.in").write_text(deck)
+            self.run_deck(folder, "moving.in", frames=2, perframe=200)
+            last = (Path(folder) / "out" / "moving.txt").read_text().split()[-3:]
+            self.assertEqual([int(float(n)) for n in last], [500, 500, 0], "all fall, none has hit the floor")
 
     def test_drum(self):
         with tempfile.TemporaryDirectory() as folder:

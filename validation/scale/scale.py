@@ -42,6 +42,7 @@ OUT = HERE / "out"
 LAUNCHER = os.environ.get("SOLIDCULL_LAUNCHER")  # default: as twin finds it
 BALL = 0.006                   # m: radius
 FALL = 0.00224                 # m: what the ball of examples/impact falls before it touches a granule
+NEAR = 0.03                                   # m: of the blow's own crater, around its middle
 SHIFTS = (0, 2.6e-8, -2.6e-8, 5.2e-8, -5.2e-8)  # m: the ball's x in each run, 1e-5 granule diameters apart
 PERIOD, GRANULES, TOP = 0.075, 20000, 0.12       # m, of the tile; m: height of the box
 MARGIN = tiles.GRANULE         # m: the sides stand as far outside of the tiles: no granule overlaps them
@@ -228,9 +229,11 @@ def window(granules, sides):
     return granules
 
 
-def crater(before, after, sides):
-    """Volume (m^3) that the surface around the middle has lost and gained."""
+def crater(before, after, sides, within=np.inf):
+    """Volume (m^3) that the surface around the middle, as far as `within` (m), has lost and gained."""
     change = example.surface(window(after, sides)) - example.surface(window(before, sides))
+    place = (np.arange(len(change)) + 0.5) * example.CELL - example.BOX / 2
+    change = change[np.hypot(place[:, None], place) < within]
     return float(-change[change < 0].sum() * example.CELL**2), float(change[change > 0].sum() * example.CELL**2)
 
 
@@ -261,6 +264,7 @@ def figures_of(scene, kind, text, made_bed, final, loads):
             "force on ball, largest (N)": columns["force"].max(), "floor load, largest rise (N)": floor.max() - floor[0],
             "floor load, end (N)": floor[-1], "kinetic energy, largest (J)": columns["bedke"].max(),
             "crater volume (m3)": lost, "heap volume (m3)": gained}
+        figures["crater_near"] = crater(before, granules, made_bed["sides"], NEAR)[0]
         if loads.exists():
             figures["element_loads"] = [round(float(x), 7) for x in element_loads(loads)]
     else:
@@ -366,6 +370,8 @@ def compared(runs, kind):
         error, margin = abs(statistics.fmean(b) - mean), max(0.02 * abs(mean), spread or 0.0)
         result["metrics"][name] = {"unculled": a, kind: b, "mean": mean, "noise_floor": spread, "error": error, "margin": margin,
                                    "good": error <= margin}
+    if all("crater_near" in r for r in unculled + own):  # runs that were kept may be older
+        result["crater_near"] = [statistics.fmean(r["crater_near"] for r in rs) for rs in (unculled, own)]
     if all("element_loads" in r for r in unculled + own):
         a, b = (np.mean([r["element_loads"] for r in rs], axis=0) for rs in (unculled, own))
         result["element_loads"] = {"largest difference (N)": float(abs(a - b).max()), "mean load (N)": float(a.mean()),
@@ -393,6 +399,8 @@ def table(report):
                 floor = "-" if m["noise_floor"] is None else twin.percent(m["noise_floor"], m["mean"])
                 lines.append(f"  {name:30} {m['mean']:12.6g} {twin.percent(m['error'], m['mean']):>9} {floor:>11} "
                              f"{twin.percent(m['margin'], m['mean']):>8} {'good' if m['good'] else 'OUTSIDE'}")
+            if "crater_near" in c:
+                lines.append(f"  crater within {1000 * NEAR:g} mm (m3): {c['crater_near'][0]:.6g} unculled, {c['crater_near'][1]:.6g} {kind}")
             if "element_loads" in c:
                 lines.append("  load on an element of the floor: " + ", ".join(f"{k} {v:.4g}" for k, v in c["element_loads"].items()))
         culled = of_size["kinds"].get("culled")
