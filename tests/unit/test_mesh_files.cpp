@@ -17,8 +17,9 @@ namespace fs = std::filesystem;
 class MeshFiles : public ::testing::Test {
  protected:
   void SetUp() override {
-    char name[] = "/tmp/solidcull-mesh-files-XXXXXX";
-    folder = ::mkdtemp(name);
+    std::string name = fs::temp_directory_path() / "solidcull-mesh-files-XXXXXX";
+    ASSERT_TRUE(::mkdtemp(name.data()));
+    folder = name;
   }
   void TearDown() override { fs::remove_all(folder); }
 

@@ -410,8 +410,9 @@ TEST(InterfaceMeshInFlight, a_merge_after_a_merge_stays_where_it_is) {
 // ------------------------------------------------------------------------------------------------------------------- files
 
 TEST(InterfaceMeshInFlight, a_vdb_file_shows_it_where_it_is) {
-  char name[] = "/tmp/solidcull-pose-XXXXXX";
-  const std::filesystem::path folder = ::mkdtemp(name);
+  std::string name = std::filesystem::temp_directory_path() / "solidcull-pose-XXXXXX";
+  ASSERT_TRUE(::mkdtemp(name.data()));
+  const std::filesystem::path folder = name;
   const std::string file = (folder / "m.vdb").string();
   const InterfaceMesh still = bitten(), moved = bitten(flown);
   write_vdb(file, {&still, &moved}, {"still", "moved"});
