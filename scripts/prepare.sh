@@ -1,13 +1,18 @@
 #!/usr/bin/env bash
 # Makes build/ ready: installs what Debian 12 lacks (root, or a user with sudo), configures, builds.
 #   scripts/prepare.sh [TARGET...]      default: everything
-# What it ran quietly is in build/prepare.log. SOLIDCULL_JOBS sets the number of compilers at once.
+#   scripts/prepare.sh --configure      builds nothing
+# What it ran quietly is in build/prepare.log. SOLIDCULL_JOBS sets the number of compilers at once. Other scripts set
+# SOLIDCULL_BUILD (another folder), SOLIDCULL_CMAKE (options of cmake), SOLIDCULL_PACKAGES (more of Debian's) and
+# SOLIDCULL_ENGINE=OFF (the core alone, without LIGGGHTS and MPI).
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
-build=$root/build
+build=${SOLIDCULL_BUILD:-$root/build}
 log=$build/prepare.log
-packages=(cmake make g++ liggghts libliggghts-dev libopenmpi-dev openmpi-bin libopenvdb-dev libtbb-dev libboost-dev
-          libeigen3-dev libgtest-dev zlib1g-dev python3 python3-numpy python3-matplotlib)
+packages=(cmake make g++ libopenvdb-dev libtbb-dev libboost-dev libeigen3-dev libgtest-dev zlib1g-dev ${SOLIDCULL_PACKAGES:-})
+if [ "${SOLIDCULL_ENGINE:=ON}" = ON ]; then
+  packages+=(liggghts libliggghts-dev libopenmpi-dev openmpi-bin python3 python3-numpy python3-matplotlib)
+fi
 gib_per_job=2  # a file that includes OpenVDB takes about 1.5
 
 fail() { [ -s "$log" ] && tail -n 15 "$log" >&2; echo "prepare: $1" >&2; exit 1; }
@@ -40,6 +45,8 @@ jobs=$((free_gib / gib_per_job))
 [ "$jobs" -gt "$cores" ] && jobs=$cores
 [ "$jobs" -lt 1 ] && jobs=1
 
-echo "prepare: building (${*:-everything})"
-cmake -S "$root" -B "$build" -DCMAKE_BUILD_TYPE=Release >>"$log" 2>&1 || fail "cmake could not configure; see above and $log"
+[ "${1:-}" = --configure ] || echo "prepare: building (${*:-everything})"
+cmake -S "$root" -B "$build" -DCMAKE_BUILD_TYPE=Release "-DSOLIDCULL_ENGINE=$SOLIDCULL_ENGINE" ${SOLIDCULL_CMAKE:-} >>"$log" 2>&1 ||
+  fail "cmake could not configure; see above and $log"
+[ "${1:-}" != --configure ] || exit 0
 cmake --build "$build" -j "${SOLIDCULL_JOBS:-$jobs}" ${*:+--target "$@"} >>"$log" 2>&1 || fail "the build failed; see above and $log"

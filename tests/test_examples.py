@@ -1,71 +1,170 @@
-"""Every example's decks run, in small and for a few steps, so that what is published cannot rot."""
+"""Every example and validation script runs, in small and for a few steps, so that what is published cannot rot.
+
+The scripts themselves check what holds for any deck (solidcull_runs/few_steps.py) and end with 2 where it does not. Here stands what
+is known of a scene without any run: numbers of granules, formulas, and what culling cannot change.
+"""
 import json
 import os
 import shutil
+import stat
 import subprocess
+import sys
 import tempfile
 import unittest
 from pathlib import Path
 
+import numpy as np
+
 ROOT = Path(__file__).resolve().parents[1]
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(ROOT / "validation"))
+from solidcull_runs import dumps, examples  # noqa: E402
+
 LAUNCHER = os.environ.get("SOLIDCULL_LAUNCHER", str(ROOT / "build" / "liggghts-solidcull"))
+GRAVITY = 9.81
 
 
-class Decks(unittest.TestCase):
-    def copied(self, name, folder):
-        for file in (ROOT / "examples" / name).iterdir():
-            if file.suffix in (".in", ".stl"):
-                shutil.copy(file, folder)
-        (Path(folder) / "out").mkdir()
+class Scripts(unittest.TestCase):
+    def nothing_lost(self, result, granules):
+        book = result["ledger"]
+        self.assertIsNotNone(book, "a run did not reach its end")
+        self.assertEqual((book["granules"], book["lost"], book["ids_missing"]), (granules, 0, 0))
+        self.assertLess(abs(book["mass_lost"]), 1e-12 * book["mass"])
 
-    def good(self, text):
-        self.assertIn("fix cull solid/cull:", text)
-        self.assertNotIn("Lost atoms", text)
+    def close(self, result, share, *names):
+        """Culled and unculled agree to a share of the figure, which is not zero."""
+        for name in names:
+            m = result["metrics"][name]
+            self.assertGreater(abs(m["mean"]), 0, name)
+            self.assertLess(m["error"], share * abs(m["mean"]), f"{name}: {m}")
 
+    def run_script(self, script, result=None, *words, launcher=LAUNCHER, status=0):
+        """Runs a script with --few-steps; what it leaves in `result`, or what it said when another status is due."""
+        if result:
+            result.unlink(missing_ok=True)
+        done = subprocess.run(["/usr/bin/python3", str(script), "--few-steps", *words], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, timeout=400, text=True,
+                              env={**os.environ, "SOLIDCULL_LAUNCHER": launcher, "SOLIDCULL_CHECK": "1"})
+        self.assertEqual(done.returncode, status, done.stdout[-2000:] + done.stderr)
+        return json.loads(result.read_text()) if result else done.stderr
+
+    def example(self, name):
+        """Its comparison, and the ends of its two runs."""
+        folder = ROOT / "examples" / name
+        few = folder / "out" / "few"
+        for old in few.glob("*.png"):
+            old.unlink()
+        result = self.run_script(folder / "example.py", few / "twin.json")
+        for file in ("table.txt", "plot.png", "side.png" if name == "plate_discharge" else "cut-away.png"):
+            self.assertTrue((few / file).stat().st_size > 0, file)
+        return result, [dumps.read_final(few / f"{kind}-1.final") for kind in ("unculled", "culled")]
+
+
+class Examples(Scripts):
     def test_impact(self):
-        with tempfile.TemporaryDirectory() as folder:
-            self.copied("impact", folder)
-            self.run_deck(folder, "settle.in", granules=500, dampsteps=300, freesteps=50)
-            self.good(self.run_deck(folder, "impact.in", granules=500, steps=200))
+        result, ends = self.example("impact")
+        self.nothing_lost(result, 901)
+        self.close(result, 0.02, "v_depth", "v_depth:max", "v_force:max", "v_floor")
+        balls = [end[end["radius"] > examples.load("impact").STRIKER] for end in ends]
+        self.assertEqual([len(ball) for ball in balls], [1, 1])
+        self.assertGreater(result["metrics"]["v_force:max"]["mean"], balls[0]["mass"][0] * GRAVITY, "the ball has not struck the bed")
 
     def test_falling_mass(self):
-        with tempfile.TemporaryDirectory() as folder:
-            self.copied("falling_mass", folder)
-            self.run_deck(folder, "make.in", granules=500, pullsteps=2000, dampsteps=300, fadesteps=300, reststeps=100)
-            self.good(self.run_deck(folder, "fall.in", frames=2, perframe=200))
-            deck = subprocess.run(["/usr/bin/python3", "-c", "import moving; print(moving.deck())"], cwd=ROOT / "examples" / "falling_mass",
-                                  stdout=subprocess.PIPE, check=True, text=True).stdout
-            (Path(folder) / "moving.in").write_text(deck)
-            self.run_deck(folder, "moving.in", frames=2, perframe=200)
-            last = (Path(folder) / "out" / "moving.txt").read_text().split()[-3:]
+        result, (unculled, culled) = self.example("falling_mass")
+        self.nothing_lost(result, 500)
+        self.assertGreater(result["culled"]["interior"], 0)
+        # none has hit the floor, so the granules' own forces move neither centre of mass
+        before = self.centre_before()
+        time = 400 / 24 / 200  # s: steps of 1/24/200 s
+        for end in (unculled, culled):
+            fallen = before - np.average(end["z"], weights=end["mass"])
+            self.assertAlmostEqual(fallen / (GRAVITY * time**2 / 2), 1, delta=1e-6)
+        self.close(result, 1e-3, "heap radius", "heap height", "heap volume")
+
+    def centre_before(self):
+        """Height of the centre of mass of the oval that hangs in the air (m); and what moving.py counts of its fall."""
+        folder = ROOT / "examples" / "falling_mass"
+        with tempfile.TemporaryDirectory() as scratch:
+            for file in folder.iterdir():
+                if file.suffix in (".in", ".stl"):
+                    shutil.copy(file, scratch)
+            bed = folder / "out" / "few" / "bed.restart"
+            code = "import moving; print(moving.deck('moving.txt'))"
+            deck = subprocess.run(["/usr/bin/python3", "-c", code], cwd=folder, stdout=subprocess.PIPE, check=True, text=True).stdout
+            deck = deck.replace("fix gravity", 'write_dump all custom start.dump id mass radius x y z modify format "%d %.15g %.15g %.15g %.15g %.15g"\nfix gravity')
+            (Path(scratch) / "moving.in").write_text(deck)
+            self.run_deck(scratch, "moving.in", restart=bed, frames=2, perframe=200)
+            last = (Path(scratch) / "moving.txt").read_text().split()[-3:]
             self.assertEqual([int(float(n)) for n in last], [500, 500, 0], "all fall, none has hit the floor")
+            start = dumps.read_final(Path(scratch) / "start.dump")
+        return np.average(start["z"], weights=start["mass"])
+
+    def run_deck(self, folder, deck, **variables):
+        command = [LAUNCHER, "-in", deck, "-log", "none"]
+        for name, value in variables.items():
+            command += ["-var", name, str(value)]
+        done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                              timeout=200, errors="replace")
+        self.assertEqual(done.returncode, 0, done.stdout[-2000:])
 
     def test_drum(self):
-        with tempfile.TemporaryDirectory() as folder:
-            self.copied("drum", folder)
-            stl = subprocess.run(["/usr/bin/python3", "-c", "import example; print(example.drum_stl())"], cwd=ROOT / "examples" / "drum",
-                                 stdout=subprocess.PIPE, check=True, text=True).stdout
-            (Path(folder) / "out" / "drum.stl").write_text(stl)
-            self.run_deck(folder, "fill.in", granules=500, poursteps=3000, turnsteps=300)
-            self.good(self.run_deck(folder, "turn.in", granules=500, steps=500))
+        result, ends = self.example("drum")
+        self.nothing_lost(result, 500)
+        self.close(result, 0.005, "centre of mass x", "centre of mass z")
+        drum = examples.load("drum")
+        for end in ends:
+            self.assertLess(np.hypot(end["x"], end["z"]).max(), drum.RADIUS, "a granule has left the drum")
+            self.assertTrue((end["y"] > 0).all() and (end["y"] < drum.LENGTH).all(), "a granule has left the drum")
 
     def test_plate_discharge(self):
-        folder = ROOT / "examples" / "plate_discharge"
-        result = self.run_script(folder / "example.py", folder / "out" / "twin-few.json")
+        result, ends = self.example("plate_discharge")
         self.nothing_lost(result, 500)
+        plate = examples.load("plate_discharge").PLATE
         left, = result["metrics"]["left on the plate"]["culled"]
+        self.assertEqual(left, (ends[1]["y"] > plate).sum())
         self.assertTrue(400 < left < 500, f"{left} granules left on the plate of 500: none ran off it, or all")
         self.assertTrue(result["metrics"]["left on the plate"]["good"], result["metrics"]["left on the plate"])
         self.assertEqual(result["metrics"]["granules outside"]["culled"], [0])
-        self.assertGreater(result["culled"]["seconds"], 0)
 
-    def test_validation_motion(self):
-        self.run_script(ROOT / "validation" / "motion" / "motion.py")
+    def test_an_unknown_example(self):
+        done = subprocess.run([str(ROOT / "examples" / "run.sh"), "nowhere"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn("no example 'nowhere'; there is: drum falling_mass impact plate_discharge", done.stderr)
 
-    def test_validation_scale(self):
+
+class Validation(Scripts):
+    def test_motion(self):
+        out = ROOT / "validation" / "motion" / "out" / "few"
+        self.run_script(ROOT / "validation" / "motion" / "motion.py", out / "tilt.json")
+        scenes = {"tilt": 150, "shake": 150, "switch": 150, "outlet": 150, "drop": 256}
+        for scene, granules in scenes.items():
+            parts = json.loads((out / f"{scene}.json").read_text())["parts"]
+            self.assertEqual(len(parts), {"shake": 2, "drop": 2}.get(scene, 1))
+            for name, part in parts.items():
+                with self.subTest(part=name):
+                    self.nothing_lost(part, granules)
+                    if scene == "drop":  # in the air: after 400 steps of 3 us it falls as anything does
+                        for kind in ("unculled", "culled"):
+                            self.assertAlmostEqual(part["metrics"]["rebound (m/s)"][kind][0], -GRAVITY * 400 * 3e-6, delta=1e-8)
+                        self.close(part, 1e-9, "radius of gyration, end (m)")
+                    else:
+                        self.assertEqual(part["metrics"]["granules outside"]["culled"], [0])
+                    if scene in ("tilt", "shake", "switch"):
+                        self.close(part, 0.01, "bed height (m)", "centre of mass (m)")
+                    if scene == "shake":
+                        self.close(part, 0.02, "floor load, largest (N)", "floor load, mean (N)")
+        stability = json.loads((out / "stability.json").read_text())
+        self.assertEqual(len(stability["figures"]["matrix"]), 6)
+        held = {c["what"]: c["good"] for c in stability["checks"] if "heavy" in c["what"] and "energy" not in c["what"]}
+        self.assertEqual(list(held.values()), [True] * 3, held)
+        for name, part in stability["figures"]["matrix"].items():
+            if "1e+09" in name:  # nothing is culled there, so nothing differs
+                self.assertEqual(part["culled"], part["unculled"], name)
+
+    def test_scale(self):
         folder = ROOT / "validation" / "scale"
         report = self.run_script(folder / "scale.py", folder / "out" / "few" / "scale.json")
-        self.assertEqual(set(report), {"tiny", "small"})
+        self.assertEqual({size: of["kinds"]["culled"]["granules"] for size, of in report.items()}, {"tiny": 700 + 1, "small": 8 * 700 + 1})
         for size, of_size in report.items():
             with self.subTest(size=size):
                 self.assertEqual(set(of_size["kinds"]), {"unculled", "culled", "control"})
@@ -74,17 +173,25 @@ class Decks(unittest.TestCase):
                 self.assertEqual(round(culled["exterior"] + culled["interface"] + culled["interior"]), culled["granules"])
                 for kind, against in of_size["against"].items():
                     self.assertEqual((against["lost"], against["ids_good"]), (0, True), kind)
-                    for name in ("depth, end (m)", "force on ball, largest (N)", "floor load, end (N)"):
-                        self.assertGreater(against["metrics"][name]["mean"], 0, name)
-                        self.assertTrue(against["metrics"][name]["good"], f"{kind}, {name}: {against['metrics'][name]}")
+                    self.close(against, 0.01, "depth, end (m)", "force on ball, largest (N)", "floor load, end (N)")
                     loads = against["element_loads"]
-                    self.assertLess(loads["largest difference (N)"], 0.1 * loads["mean load (N)"])
-        self.assertEqual([r["lost"] for r in self.run_script(folder / "weight.py", folder / "out" / "few" / "weight.json").values()], [0, 0])
+                    self.assertLess(loads["largest difference (N)"], 0.01 * loads["mean load (N)"])
+
+    def test_scale_weight(self):
+        folder = ROOT / "validation" / "scale"
+        for part, r in self.run_script(folder / "weight.py", folder / "out" / "few" / "weight.json").items():
+            self.assertEqual((r["granules"], r["lost"], r["elements"]), (8 * 700, 0, 4), part)
+            largest, total = r["largest change of an element, and of all"]["asleep from free"]
+            self.assertLess(largest, 0.005, part)
+            self.assertLess(total, 0.005, part)
+
+    def test_scale_choices(self):
+        folder = ROOT / "validation" / "scale"
         choices = self.run_script(folder / "choices.py", folder / "out" / "few" / "choices.json")
         self.assertEqual({c["lost"] for c in choices.values()}, {0})
         self.assertGreater(choices["sleep"]["over_exterior"], choices["live"]["over_exterior"])
 
-    def test_validation_activity(self):
+    def test_activity(self):
         few = ROOT / "validation" / "activity" / "out" / "few"
         # asleep, so that the small beds, a few granules high, are culled at all
         self.run_script(few.parents[1] / "activity.py", few / "silo.json", "--check", "--fix", "exterior sleep")
@@ -100,32 +207,53 @@ class Decks(unittest.TestCase):
                         self.assertGreater(part["culled"]["interior"], 0)
                         self.assertGreater(part["culled"]["restored"], 0)
                         self.assertEqual(part["metrics"]["granules outside"]["culled"], [0])
-                        height = part["metrics"]["centre of mass (m)"]
-                        self.assertLess(height["error"], 0.05 * height["mean"], height)
+                        self.close(part, 0.005, "centre of mass (m)", "mean height of the surface (m)")
+                    elif part["culled"]["culled"] == 0:  # then nothing differs
+                        m = part["metrics"]["kinetic energy, mean (J)"]
+                        self.assertEqual(m["culled"], m["unculled"])
 
-    def nothing_lost(self, result, granules):
-        book = result["ledger"]
-        self.assertIsNotNone(book, "a run did not reach its end")
-        self.assertEqual((book["granules"], book["lost"], book["ids_missing"]), (granules, 0, 0))
-        self.assertLess(abs(book["mass_lost"]), 1e-12 * book["mass"])
 
-    def run_script(self, script, result=None, *words):
-        """Runs a script with --few-steps; what it leaves in `result`."""
-        if result:
-            result.unlink(missing_ok=True)
-        done = subprocess.run(["/usr/bin/python3", str(script), "--few-steps", *words], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                              stderr=subprocess.STDOUT, timeout=400, text=True, env={**os.environ, "SOLIDCULL_LAUNCHER": LAUNCHER})
-        self.assertEqual(done.returncode, 0, done.stdout[-2000:])
-        return json.loads(result.read_text()) if result else None
+# stands before the launcher and spoils the run
+SPOILER = """\
+#!/usr/bin/python3
+import os, re, subprocess, sys
+at = sys.argv.index("-in") + 1
+deck = open(sys.argv[at]).read()
+if re.search("(?m)^fix cull", deck):
+    {change}
+    open(sys.argv[at], "w").write(deck)
+status = subprocess.run([{launcher!r}, *sys.argv[1:]]).returncode
+final = re.search(r'(?m)^write_dump all custom "(.*?)"', deck)
+if {lose} and final and re.search("(?m)^fix cull", deck):
+    lines = open(final[1]).read().splitlines()
+    open(final[1], "w").write("\\n".join(lines[:-1]) + "\\n")
+sys.exit(status)
+"""
 
-    def run_deck(self, folder, deck, **variables):
-        command = [LAUNCHER, "-in", deck, "-log", "none"]
-        for name, value in variables.items():
-            command += ["-var", name, str(value)]
-        done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                              timeout=200, errors="replace", env={**os.environ, "SOLIDCULL_CHECK": "1"})
-        self.assertEqual(done.returncode, 0, done.stdout[-2000:])
-        return done.stdout
+
+class Spoiled(Scripts):
+    """What a few steps must not let pass, in a real run: one line, status 2."""
+
+    def spoiled(self, change="pass", lose=False):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        launcher = Path(folder.name) / "launcher"
+        launcher.write_text(SPOILER.format(change=change, lose=lose, launcher=LAUNCHER))
+        launcher.chmod(launcher.stat().st_mode | stat.S_IXUSR)
+        said = self.run_script(ROOT / "validation" / "motion" / "motion.py", None, "drop", launcher=str(launcher), status=2)
+        self.assertEqual(said.count("\n"), 1, said)
+        return said
+
+    def test_a_fix_that_locks_nothing(self):
+        self.assertIn("motion: drop-flat, few steps: culled-1 locked no granule",
+                      self.spoiled(r"""deck = re.sub("(?m)^(fix cull .*)$", r"\1 every 1000000", deck)"""))
+
+    def test_a_deck_that_ends_early(self):
+        self.assertIn("motion: drop-flat, few steps: culled-1 made 400 steps after the fix line, not 800",
+                      self.spoiled(r"""deck = re.sub(r"(?m)^run \$\{steps\}$", "run 0", deck)"""))
+
+    def test_a_granule_that_is_lost(self):
+        self.assertIn("motion: drop-flat, few steps: culled-1 ended with 255 granules of 255 ids, not 256", self.spoiled(lose=True))
 
 
 if __name__ == "__main__":

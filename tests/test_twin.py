@@ -1,11 +1,15 @@
-"""validation/twin.py: decks with and without the fix line, logs, figures, and each refusal by its text."""
+"""validation/twin.py and solidcull_runs: decks with and without the fix line, logs, figures, and each refusal by its text."""
 import base64
 import contextlib
 import io
+import json
 import os
 import stat
+import subprocess
 import sys
 import tempfile
+import time
+import types
 import unittest
 from pathlib import Path
 
@@ -13,9 +17,9 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
-sys.path[:0] = [str(ROOT / "validation"), str(ROOT / "examples")]
-import pictures  # noqa: E402
-import twin      # noqa: E402
+sys.path.insert(0, str(ROOT / "validation"))
+import twin  # noqa: E402
+from solidcull_runs import beds, decks, dumps, engine, errors, few_steps, logs, meshes, metrics, pictures, surfaces, tables, twins  # noqa: E402
 
 DECK = """\
 variable dx index 0
@@ -47,8 +51,8 @@ Memory usage per processor = 9.97283 Mbytes
 Loop time of 7e-07 on 1 procs for 0 steps with 20 atoms, finish time Sat Nov 21 04:56:08 2026
 
 Nlocal:    20 ave 20 max 20 min
-print "{twin.FROM_HERE}"
-{twin.FROM_HERE}
+print "{logs.FROM_HERE}"
+{logs.FROM_HERE}
 Memory usage per processor = 9.97283 Mbytes
     Step         KinEng            top        wall[3]
        0              1            0.5              8
@@ -61,7 +65,7 @@ Memory usage per processor = 9.97283 Mbytes
      200              3            0.6             10
      300              2            0.4              5
 Loop time of 1.5 on 1 procs for 100 steps with 20 atoms, finish time Sat Nov 21 04:56:08 2026
-{twin.TO_HERE}
+{logs.TO_HERE}
     Step    Atoms         KinEng
      300       20             99
 Loop time of 9 on 1 procs for 0 steps with 20 atoms, finish time Sat Nov 21 04:56:08 2026
@@ -70,11 +74,19 @@ Loop time of 9 on 1 procs for 0 steps with 20 atoms, finish time Sat Nov 21 04:5
 # stands in for LIGGGHTS: prints a log that depends on the deck's name and writes what twin asks for
 FAKE = """\
 #!/usr/bin/python3
-import re, sys
+import os, re, signal, sys, time
 deck = open(sys.argv[sys.argv.index("-in") + 1]).read()
 if "read_restart missing" in deck:
     print("ERROR: Cannot open restart file missing (./src/read_restart.cpp:533)")
     sys.exit(1)
+if "killed" in deck:
+    os.kill(os.getpid(), signal.SIGKILL)
+if "forever" in deck:
+    if "# fix cull" in deck:
+        print("ERROR: the first of two runs fails")
+        sys.exit(1)
+    open("pid", "w").write(str(os.getpid()))
+    time.sleep(600)
 culled = re.search(r"(?m)^fix cull", deck) is not None
 shift = 0.01 * ("set group all x" in deck)
 print("twin: counted from here\\n    Step    depth")
@@ -100,7 +112,7 @@ class Folder(unittest.TestCase):
         return self.folder / name
 
     def refused(self, text, call, *args, **keywords):
-        with self.assertRaises(twin.TwinError) as e:
+        with self.assertRaises(errors.RunError) as e:
             call(*args, **keywords)
         self.assertIn(text, str(e.exception))
         self.assertNotIn("\n", str(e.exception))
@@ -109,17 +121,17 @@ class Folder(unittest.TestCase):
 class Decks(Folder):
     def setUp(self):
         super().setUp()
-        self.lines = twin.read_deck(self.write("in.deck", DECK))
+        self.lines = decks.read_deck(self.write("in.deck", DECK))
 
     def made(self, culled, seed=None, lines=None):
-        return twin.make_deck(lines or self.lines, "cull", culled, seed, "out/run-1")
+        return decks.make_deck(lines or self.lines, "cull", culled, seed, "out/run-1")
 
     def test_the_fix_is_found_over_continued_lines(self):
-        self.assertEqual(twin.cull_fix(self.lines), "cull")
+        self.assertEqual(decks.cull_fix(self.lines), "cull")
 
     def test_the_fix_is_found_in_an_included_file(self):
         self.write("rest.in", "fix c2 all solid/cull\nrun 10\n")
-        self.assertEqual(twin.cull_fix(twin.read_deck(self.write("in.outer", "units si\ninclude rest.in\n"))), "c2")
+        self.assertEqual(decks.cull_fix(decks.read_deck(self.write("in.outer", "units si\ninclude rest.in\n"))), "c2")
 
     def test_unculled_keeps_nothing_that_hangs_on_the_fix(self):
         live = [line for line in self.made(False) if not line.lstrip().startswith("#")]
@@ -138,12 +150,12 @@ class Decks(Folder):
 
     def test_culled_takes_its_dependents_away_where_the_deck_does_not(self):
         tail = self.made(True, lines=self.lines[:-3])
-        tail = tail[tail.index(f'print "{twin.TO_HERE}"'):]
+        tail = tail[tail.index(f'print "{logs.TO_HERE}"'):]
         self.assertEqual(tail[1:-1], ["thermo_style one", "unfix twin_counts", "undump d", "region solid delete",
                                       "uncompute mine", "variable share delete", "unfix cull", "run 0"])
 
     def test_the_shift_stands_before_the_first_run_behind_the_fix(self):
-        made = self.made(False, seed=twin.SEEDS[0])
+        made = self.made(False, seed=decks.SEEDS[0])
         self.assertTrue(made[made.index("run 1000") - 1].startswith("set group all z"))
         self.assertEqual(sum("set group" in line for line in made), 3)
 
@@ -152,19 +164,19 @@ class Decks(Folder):
         self.refused("hangs on the solid/cull fix and cannot be left out: if", self.made, False, lines=lines)
 
     def test_refusals(self):
-        self.refused("has no `fix ID group solid/cull` line", twin.cull_fix, ["run 10"], "in.deck")
-        self.refused("has 2 solid/cull lines", twin.cull_fix, ["fix a all solid/cull", "fix b all solid/cull"])
-        self.refused("cannot read the deck", twin.read_deck, self.folder / "none.in")
+        self.refused("has no `fix ID group solid/cull` line", decks.cull_fix, ["run 10"], "in.deck")
+        self.refused("has 2 solid/cull lines", decks.cull_fix, ["fix a all solid/cull", "fix b all solid/cull"])
+        self.refused("cannot read the deck", decks.read_deck, self.folder / "none.in")
         made = self.made(False)
-        twin.check_metrics(["c_top", "top:max", "ke", "KinEng:mean"], made)
+        decks.check_metrics(["c_top", "top:max", "ke", "KinEng:mean"], made)
         self.refused("height is not among the thermo columns of the deck without the fix: step, ke, c_top",
-                     twin.check_metrics, ["height"], made)
-        self.refused("f_cull[1] is not among", twin.check_metrics, ["f_cull[1]"], made)
-        self.refused("`median` is not one of end, max, min, mean", twin.check_metrics, ["ke:median"], made)
+                     decks.check_metrics, ["height"], made)
+        self.refused("f_cull[1] is not among", decks.check_metrics, ["f_cull[1]"], made)
+        self.refused("`median` is not one of end, max, min, mean", decks.check_metrics, ["ke:median"], made)
 
 
 class Logs(Folder):
-    tables = twin.parse_log(LOG)
+    tables = logs.parse_log(LOG)
 
     def test_tables(self):
         self.assertEqual([len(t.rows) for t in self.tables], [1, 3, 2, 1])
@@ -173,26 +185,31 @@ class Logs(Folder):
 
     def test_reducers(self):
         for metric, value in {"ke": 2, "KinEng:max": 4, "c_top:min": 0.4, "top:mean": 1.7 / 3}.items():
-            self.assertAlmostEqual(twin.metric_of(self.tables, metric), value, msg=metric)
+            self.assertAlmostEqual(logs.metric_of(self.tables, metric), value, msg=metric)
 
     def test_a_row_that_a_run_repeats_does_not_count(self):
-        self.assertEqual(twin.metric_of(self.tables, "f_wall[3]:max"), 5)
+        self.assertEqual(logs.metric_of(self.tables, "f_wall[3]:max"), 5)
+
+    def test_steps_made_so_far(self):
+        for text, steps in ((LOG, 300), (LOG[:LOG.index("     200")], 100), (LOG[:100], 0)):
+            self.assertEqual(logs.steps_made(self.write("a.log", text)), steps)
+        self.assertEqual(logs.steps_made(self.folder / "none.log"), 0)
 
     def test_a_log_that_breaks_off(self):
-        self.assertEqual(len(twin.parse_log(LOG[:LOG.index("     200")])), 2)
+        self.assertEqual(len(logs.parse_log(LOG[:LOG.index("     200")])), 2)
 
     def test_refusals(self):
         self.refused("c_height is not among the thermo columns printed after the solid/cull line: Step, KinEng, top, wall[3]",
-                     twin.metric_of, self.tables, "c_height")
-        self.refused("line: none", twin.metric_of, [], "ke")
-        self.assertEqual(twin.error_in("WARNING: x\nERROR: first\nERROR: last (a.cpp:3)\nmpirun noise\n"), "ERROR: last (a.cpp:3)")
-        self.assertEqual(twin.error_in("Segmentation fault\n\n"), "Segmentation fault")
+                     logs.metric_of, self.tables, "c_height")
+        self.refused("line: none", logs.metric_of, [], "ke")
+        self.assertEqual(engine.error_in("WARNING: x\nERROR: first\nERROR: last (a.cpp:3)\nmpirun noise\n"), "ERROR: last (a.cpp:3)")
+        self.assertEqual(engine.error_in("Segmentation fault\n\n"), "Segmentation fault")
 
 
 class Figures(unittest.TestCase):
     def judged(self, unculled, culled, **more):
-        runs = [[twin.Run("r", [], 1.0, metrics={"m": v}) for v in values] for values in (unculled, culled)]
-        return twin.judge(*runs, margin=0.02, **more)["metrics"]["m"]
+        runs = [[twins.Run("r", [], 1.0, metrics={"m": v}) for v in values] for values in (unculled, culled)]
+        return metrics.judge(*runs, margin=0.02, **more)["metrics"]["m"]
 
     def test_margin_is_the_larger_of_two_percent_and_the_floor(self):
         self.assertTrue(self.judged([1.0, 1.0, 1.0], [1.019])["good"])
@@ -209,9 +226,24 @@ class Figures(unittest.TestCase):
     def test_ledger(self):
         kind = [("id", int), ("mass", float)]
         a = np.array([(1, 0.5), (2, 0.5), (3, 0.25)], kind)
-        self.assertEqual(twin.ledger(a, [a[[0, 2]]]),
+        self.assertEqual(metrics.ledger(a, [a[[0, 2]]]),
                          {"granules": 3, "lost": 1, "ids_missing": 1, "mass": 1.25, "mass_lost": 0.5})
-        self.assertIsNone(twin.ledger(a, [a, None]))
+        self.assertIsNone(metrics.ledger(a, [a, None]))
+        self.assertEqual(metrics.ledger(a, [a], granules=5)["lost"], 2, "the unculled run counts as little as the culled one")
+
+    def test_a_figure_outside_its_margin_is_named(self):
+        runs = [[twins.Run("r", [], 1.0, metrics={"good one": 1.0, "bad one": v})] for v in (1.0, 1.1)]
+        text = tables.table(metrics.judge(*runs))
+        self.assertIn("OUTSIDE its margin: bad one\n", text + "\n")
+        self.assertIn("all metrics within their margins", tables.table(metrics.judge(runs[0], runs[0])))
+
+    def test_speed_up_is_of_the_time_in_which_a_run_had_its_core(self):
+        unculled, culled = twins.Run("u", [], 10.0, wall=20.0, cpu=10.0), twins.Run("c", [], 4.0, wall=8.0, cpu=8.0)
+        self.assertAlmostEqual(metrics.judge([unculled], [culled])["speed_up"], 5 / 4)
+        self.assertEqual(twins.Run("r", [], 3.0).own_time, 3.0)
+
+    def test_noise_is_the_largest_distance_of_two_unculled_runs(self):
+        self.assertEqual(metrics.apart([0, 1, 5], [2], lambda a, b: abs(a - b)), ((2 + 1 + 3) / 3, 5))
 
 
 class Command(Folder):
@@ -223,7 +255,8 @@ class Command(Folder):
     def run_twin(self, deck, *options):
         out, err = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            status = twin.main([str(self.write("in.deck", deck)), "--launcher", str(self.launcher), *options])
+            words = [str(self.write("in.deck", deck)), "--launcher", str(self.launcher), *options]
+            status = errors.status_of("twin", lambda: twin.main(words))
         return status, out.getvalue(), err.getvalue()
 
     DECK = "fix cull all solid/cull\nthermo_style custom step v_depth\nrun 20\n"
@@ -231,7 +264,10 @@ class Command(Folder):
     def test_table_and_files(self):
         status, out, _ = self.run_twin(self.DECK, "--metrics", "v_depth", "--plot")
         self.assertEqual(status, 0, out)
-        self.assertIn("speed-up 2.50", out)
+        result = json.loads((self.folder / "in.deck.twin" / "twin.json").read_text())
+        self.assertEqual([result[kind]["loop_times"] for kind in twins.KINDS], [[10] * 3, [4]])
+        self.assertAlmostEqual(result["speed_up"], result["unculled"]["own_time"] / result["culled"]["own_time"])
+        self.assertIn(f"speed-up {result['speed_up']:.2f}", out)
         self.assertIn("exterior 5, interface 3, interior 12", out)
         self.assertIn("lost 0, ids missing 0", out)
         self.assertRegex(out, r"v_depth +1\.00667 +1\.001 .* good")
@@ -247,13 +283,29 @@ class Command(Folder):
         for deck, options, text in (
                 ("run 10\n", (), "twin: in.deck has no `fix ID group solid/cull` line"),
                 ("read_restart missing\n" + self.DECK, (), "unculled-1: LIGGGHTS stopped with status 1: ERROR: Cannot open restart"),
+                ("# killed\n" + self.DECK, (), "unculled-1: LIGGGHTS was killed by signal 9 (SIGKILL): it printed nothing (all of it: "),
                 (self.DECK, ("--metrics", "c_nope"), "c_nope is not among the thermo columns"),
+                (self.DECK, ("--metrics", "v_depth:median"), "`median` is not one of end, max, min, mean"),
                 (self.DECK, ("--launcher", "/nowhere/liggghts-solidcull"), "no launcher at /nowhere/liggghts-solidcull"),
                 (self.DECK, ("--vary", "dx=0,1"), "--vary dx has 2 values for 3 runs")):
             status, out, err = self.run_twin(deck, *options)
             self.assertEqual((status, out), (2, ""), text)
             self.assertIn(text, err)
             self.assertEqual(err.count("\n"), 1, err)
+
+    def test_runs_at_once_give_the_same_in_the_same_order(self):
+        _, one, _ = self.run_twin(self.DECK, "--metrics", "v_depth", "--culled", "2")
+        _, two, said = self.run_twin(self.DECK, "--metrics", "v_depth", "--culled", "2", "--at-once", "2")
+        self.assertEqual(*[[line for line in text.splitlines() if line.startswith("v_depth")] for text in (one, two)])
+        self.assertIn("5 of 5 runs done", said)
+
+    def test_a_run_that_fails_stops_those_beside_it(self):
+        began = time.monotonic()
+        status, _, err = self.run_twin("# forever\n" + self.DECK, "--at-once", "2")
+        self.assertEqual((status, err.count("\n")), (2, 1), err)
+        self.assertLess(time.monotonic() - began, 60)
+        pid = self.folder / "pid"
+        self.assertFalse(pid.exists() and Path(f"/proc/{pid.read_text()}").exists(), "the other run goes on")
 
     def test_runs_that_are_all_alike_are_named(self):
         _, out, _ = self.run_twin(self.DECK, "--metrics", "v_depth", "--vary", "dx=0,1,2")
@@ -296,6 +348,160 @@ class Pictures(Folder):
         picture.spheres(bed["points"], bed["radius"], [pictures.STATES[s][1] for s in bed["state"]])
         red, green, blue = picture.image[20, 20]
         self.assertGreater(blue, green)
+
+
+class FewSteps(Folder):
+    """What driver's `--few-steps` must not let pass; each fault by its line."""
+
+    def run_of(self, name="culled-1", **changed):
+        final = np.array([(k, 0.5, 0.1, 0, 0, 0.1 * k) for k in (1, 2, 3)],
+                         [("id", int)] + [(c, float) for c in ("mass", "radius", "x", "y", "z")])
+        counts = {"exterior": np.array([3.0, 1]), "interface": np.array([0.0, 1]), "interior": np.array([0.0, 1])}
+        table = logs.Table(["Step", "Atoms", "cull[3]"], [[100, 3, 0], [120, 2, 1]], counted=True)
+        run = twins.Run(name, [table], 1.0, counts if name.startswith("culled") else None, final, {"m": 1.0}, reached_the_end=True)
+        for key, value in changed.items():
+            setattr(run, key, value)
+        return run
+
+    def check(self, culled, **how):
+        few_steps.check({"unculled": [self.run_of("unculled-1")], "culled": [culled]}, 3, 20, **how)
+
+    def test_what_is_whole_passes(self):
+        self.check(self.run_of())
+
+    def test_each_fault_is_a_line(self):
+        whole = self.run_of()
+        elsewhere, heavier, lost = whole.final.copy(), whole.final.copy(), whole.final.copy()[:2]
+        elsewhere["z"][1], heavier["mass"][0] = np.nan, 0.6
+        other = whole.final.copy()
+        other["id"][2] = 7
+        still = {name: np.array([3.0 * (name == "exterior")] * 2) for name in whole.counts}
+        short = {**whole.counts, "interior": np.array([0.0, 0])}
+        leaky = logs.Table(["Step", "Atoms", "cull[3]"], [[100, 3, 0], [120, 1, 1]], counted=True)
+        silent = logs.Table(["Step", "KinEng"], [[100, 3], [120, 1]], counted=True)
+        for changed, text in (({"reached_the_end": False}, "culled-1 did not reach the end of its deck"),
+                              ({"final": None}, "did not reach the end of its deck"),
+                              ({"tables": [logs.Table(["Step"], [[100], [110]], counted=True)]}, "made 10 steps after the fix line, not 20"),
+                              ({"final": lost}, "ended with 2 granules of 2 ids, not 3"),
+                              ({"final": elsewhere}, "whose place or mass is no number"),
+                              ({"final": other}, "ended with other ids than unculled-1"),
+                              ({"final": heavier}, "ended with 1.6 kg, unculled-1 with 1.5 kg"),
+                              ({"metrics": {"m": float("nan")}}, "has no number for m"),
+                              ({"counts": None}, "left no counts of the fix"),
+                              ({"counts": short}, "counted 2 to 3 exterior, interface and interior granules, not 3"),
+                              ({"tables": [leaky]}, "held 1 atoms and 1 stored granules, not 3 together"),
+                              ({"tables": [silent]}, "printed no row with `atoms` and `f_cull[3]`"),
+                              ({"counts": still}, "locked no granule")):
+            with self.subTest(fault=text):
+                self.refused(text, self.check, self.run_of(**changed))
+        self.check(self.run_of(counts=still), locks=False)
+
+
+class Progress(Folder):
+    """The time left, of what is known of each kind of run."""
+
+    def progress(self, steps=None):
+        kinds = [twins.Job(self.folder / "in.deck", self.folder, kind, k) for kind, k in twins.in_turns(2, 2)]
+        return kinds, twins.Progress(kinds, 2, lambda line: None, steps)
+
+    def running(self, job, seconds, step):
+        log = self.write(f"{job.name}.log", f"  90 3\n{logs.FROM_HERE}\n    Step  Atoms\n  500 3\n  {500 + step} 3\n")
+        return job, types.SimpleNamespace(log=log, began=time.monotonic() - seconds)
+
+    def test_of_finished_runs(self):
+        (_, _, unculled, _), progress = self.progress()
+        self.assertIsNone(progress.seconds_left([]))
+        progress.walls = {"unculled": [100.0], "culled": [20.0]}
+        # 100 - 40 s of the one that runs and 20 s of the one that waits, on two cores
+        self.assertAlmostEqual(progress.seconds_left([self.running(unculled, 40, 0)]), 60, delta=1)
+
+    def test_of_the_steps_of_running_ones(self):
+        (unculled, culled, _, _), progress = self.progress(steps=1000)
+        both = [self.running(unculled, 50, 500), self.running(culled, 50, 800)]
+        self.assertAlmostEqual(progress.seconds_left(both), (50 + 12.5 + 100 + 62.5) / 2, delta=1)
+        self.assertIsNone(progress.seconds_left([both[0], self.running(culled, 50, 10)]), "too early to tell")
+
+
+class Kept(Folder):
+    def test_a_bed_is_made_again_when_its_recipe_changes(self):
+        made = []
+
+        def bed(recipe):
+            return beds.made(self.folder / "bed.restart", recipe, lambda part: (made.append(recipe), part.write_text(recipe)), say=made.append)
+        for recipe in ("a", "a", "b"):
+            self.assertEqual(bed(recipe).read_text(), recipe)
+        self.assertEqual([m for m in made if m in "ab"], ["a", "b"])
+
+    def test_a_bed_whose_making_failed_is_not_there(self):
+        def fails(part):
+            part.write_text("half")
+            raise errors.RunError("no")
+        for _ in range(2):
+            self.refused("no", beds.made, self.folder / "bed.restart", "a", fails, say=lambda line: None)
+        self.assertFalse((self.folder / "bed.restart").exists())
+
+    def test_a_kept_run_is_not_made_again(self):
+        launcher = self.write("launcher", FAKE)
+        launcher.chmod(0o755)
+        deck = self.write("in.deck", Command.DECK)
+
+        def walls(**how):
+            job = twins.KeptJob(deck, self.folder / "out", "culled", 0, launcher=str(launcher), **how)
+            return [run.wall for run in twins.run_jobs([job])]
+        first = walls()
+        self.assertEqual(walls(), first)
+        self.assertNotEqual(walls(made_with="another library"), first)
+
+
+class Files(Folder):
+    def test_the_height_map_is_that_of_a_sphere(self):
+        granule = np.array([(0.5, 0.5, 0.3, 0.2)], [(c, float) for c in ("x", "y", "z", "radius")])
+        height = surfaces.height_map(granule, (0, 0), (1, 1), 0.01, ground=-1)
+        self.assertAlmostEqual(height.max(), 0.5, delta=2e-4)
+        self.assertAlmostEqual((height > -1).mean(), np.pi * 0.2**2, delta=1e-3)
+        self.assertAlmostEqual(height[height > -1].mean(), 0.3 + 2 / 3 * 0.2, delta=1e-3)
+
+    def test_meshes_are_closed(self):
+        for name, triangles, area in (("block", meshes.block((0, 0, 0), (1, 2, 3)), 22.0),
+                                      ("drum", meshes.drum(1.0, 2.0, 360), 2 * np.pi + 4 * np.pi)):
+            corners = np.array(triangles, float)
+            edges = {}
+            for t in corners.round(9).tolist():
+                for k in range(3):
+                    ends = frozenset(map(tuple, (t[k], t[(k + 1) % 3])))
+                    edges[ends] = edges.get(ends, 0) + 1
+            self.assertEqual(set(edges.values()), {2}, name)
+            found = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+            self.assertAlmostEqual(found / area, 1, delta=1e-4, msg=name)
+
+    def test_snapshots_of_a_dump(self):
+        text = "".join(f"ITEM: TIMESTEP\n{s}\nITEM: NUMBER OF ATOMS\n{len(rows)}\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
+                       f"ITEM: ATOMS id mass \n" + "".join(f"{i} {m}\n" for i, m in rows) for s, rows in ((0, []), (5, [(2, 0.5), (1, 0.25)])))
+        file = self.write("a.dump", text)
+        self.assertEqual([(step, columns, rows.tolist()) for step, columns, rows in dumps.snapshots(file)],
+                         [(0, ["id", "mass"], []), (5, ["id", "mass"], [[2, 0.5], [1, 0.25]])])
+        self.assertEqual(dumps.read_final(file).tolist(), [(1, 0.25), (2, 0.5)])
+        self.refused("cannot read", dumps.read_final, self.folder / "none.dump")
+        self.refused("holds no snapshot", dumps.read_final, self.write("empty.dump", ""))
+
+
+class Drivers(unittest.TestCase):
+    """Each driver's own command, where no run can succeed: one line, status 2."""
+
+    DRIVERS = ("examples/impact/example.py", "examples/drum/example.py", "examples/falling_mass/example.py", "examples/plate_discharge/example.py",
+               "validation/motion/motion.py", "validation/scale/scale.py", "validation/scale/choices.py", "validation/scale/weight.py",
+               "validation/activity/activity.py")
+
+    def test_no_launcher(self):
+        for driver in self.DRIVERS:
+            with self.subTest(driver=driver):
+                # of few steps, so that beds of a user's own runs stay as they are
+                scene = ["tilt"] if "motion" in driver else ["gas"] if "activity" in driver else []
+                done = subprocess.run(["/usr/bin/python3", str(ROOT / driver), "--few-steps", *scene], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                      stderr=subprocess.PIPE, text=True, timeout=100, env={**os.environ, engine.NAMED_BY: "/nowhere/liggghts-solidcull"})
+                self.assertEqual(done.returncode, 2, done.stderr)
+                self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+                self.assertIn("no launcher at /nowhere/liggghts-solidcull", done.stderr)
 
 
 if __name__ == "__main__":

@@ -37,6 +37,19 @@ double energy_of_height(const State& s) {
   return sum;
 }
 
+/// From one granule of a contact to the other, length 1. Across a periodic side, the near image counts.
+std::vector<double> direction(const State& places, const std::pair<int, int>& contact, const Bed& bed) {
+  const Vec &from = places.at(contact.first).x, &to = places.at(contact.second).x;
+  std::vector<double> way(3);
+  for (int d = 0; d < 3; ++d) {
+    way[d] = to[d] - from[d];
+    if (bed.periodic && d < 2) way[d] -= bed.side * std::round(way[d] / bed.side);
+  }
+  const double apart = std::hypot(way[0], way[1], way[2]);
+  for (double& w : way) w /= apart;
+  return way;
+}
+
 class Compact : public testing::TestWithParam<Bed> {};
 
 TEST_P(Compact, CullAndRestoreKeepsAllButBitsOfHistories) {
@@ -62,6 +75,7 @@ TEST_P(Compact, CullAndRestoreKeepsAllButBitsOfHistories) {
   }
   const Histories ha = never.histories(), hb = culled.histories();
   EXPECT_EQ(ha.size(), hb.size());
+  const State places = never.state();
   double off = 0, scale = 0;
   std::size_t whole = 0, rounded = 0, lost = 0;
   const auto size = [](const std::vector<double>& h, std::size_t first) {
@@ -73,19 +87,25 @@ TEST_P(Compact, CullAndRestoreKeepsAllButBitsOfHistories) {
     ASSERT_NE(other, hb.end()) << h.first.first << " and " << h.first.second << " touch no more";
     bool same = true, none = true;
     double worst = 0;
+    const std::vector<double> across = direction(places, h.first, b);
     for (std::size_t v = 0; v + 2 < h.second.size(); v += 3) {  // shear, rolling torque
-      std::vector<double> difference;
+      std::vector<double> difference, in_plane(h.second.begin() + v, h.second.begin() + v + 3);
       for (std::size_t d = v; d < v + 3; ++d) difference.push_back(other->second[d] - h.second[d]);
+      std::vector<double> off_in_plane = difference;
+      for (std::vector<double>* flat : {&in_plane, &off_in_plane}) {
+        const double along = (*flat)[0] * across[0] + (*flat)[1] * across[1] + (*flat)[2] * across[2];
+        for (int d = 0; d < 3; ++d) (*flat)[d] -= along * across[d];
+      }
       none = none && size(other->second, v) == 0;
       same = same && size(difference, 0) <= 1e-12 * scale;
-      if (size(h.second, v) > 0) worst = std::max(worst, size(difference, 0) / size(h.second, v));
+      if (size(in_plane, 0) > 0) worst = std::max(worst, size(off_in_plane, 0) / size(in_plane, 0));
     }
     whole += same;
     lost += none && !same;
     rounded += !none && !same;
     if (!none && !same) off = std::max(off, worst);
   }
-  EXPECT_LE(off, 0.05) << "1 % in the plane of contact; what the engine has left across it is not kept";
+  EXPECT_LE(off, 0.015) << "1.1 % of four packings, in the plane of contact; what the engine has left across it is not kept";
   EXPECT_LE(lost, 2 + ha.size() / 1000) << "two partners with one key";
   for (int k = 0; k <= 4; ++k) {
     const State a = never.state(), c = culled.state();
@@ -102,8 +122,10 @@ TEST_P(Compact, CullAndRestoreKeepsAllButBitsOfHistories) {
     }
   }
   const double apart = largest_difference(never.state(), culled.state(), &Granule::x);
+  // 6e-6 d and 2e-14 J were measured on one rank, 6e-5 d and 1e-12 J on two; a granule that falls through its own diameter gains
+  // 6e-7 J
   EXPECT_LE(apart, 1e-4 * diameter) << "contacts bear what they bore";
-  EXPECT_LE(energy_of_motion(culled.state()), energy_of_motion(never.state()) * 1.1 + 1e-13);
+  EXPECT_LE(energy_of_motion(culled.state()), energy_of_motion(never.state()) + 1e-11);
 }
 
 Bed periodic() {
@@ -122,38 +144,42 @@ const char* rain =
     "group rain id > 1300\nset group rain diameter 0.0026\nset group rain density 2500\nvelocity rain set 0 0 -1.0\n";
 
 TEST(CompactScenes, RainOnACompactBedLosesNothing) {
-  for (Bed b : {bed("compact_rolling"), periodic()}) {
+  for (const Bed& b : {bed("compact_rolling"), periodic()}) {
     Engine e;
     e.run(read_bed(b) + compact + "run 300\n");
     ASSERT_GT(f(e, 3), 900);
     e.run(rain);
-    const double all = 1300 + 64;
+    const std::size_t all = 1300 + 64;
     for (int k = 0; k < 12; ++k) {
       e.run("run 250\n");
-      EXPECT_EQ(f(e, 1) + f(e, 2) + f(e, 3), all);
+      expect_all_there(e, "cull", all);
       EXPECT_NEAR(f(e, 11), 0, 1e-12 * 0.03) << "mass error";
     }
     EXPECT_GT(f(e, 7), 30) << "restored: the rain wakes what it hits";
     const double interior = f(e, 3);
     e.run("unfix cull\nrun 0\n");
     const State end = e.state();
-    EXPECT_EQ(static_cast<double>(end.size()), all);
-    for (int tag = 1; tag <= 1300; ++tag) ASSERT_TRUE(end.count(tag)) << tag << " is lost";
-    if (e.rank() == 0) std::printf("%s: %g of %g interior at the end\n", b.name.c_str(), interior, all);
+    EXPECT_EQ(end.size(), all);
+    for (int tag = 1; tag <= static_cast<int>(all); ++tag) ASSERT_TRUE(end.count(tag)) << tag << " is lost";
+    if (e.rank() == 0) std::printf("%s: %g of %zu interior at the end\n", b.name.c_str(), interior, all);
   }
 }
 
 TEST(CompactScenes, ARestartGoesOnWhereItStopped) {
   const Bed b = bed("compact_rolling");
   Engine straight;
-  straight.run(read_bed(b) + "run 0\n" + rain + compact + "run 400\nwrite_restart compact.restart\nrun 800\n");
+  // 300 steps: the rain has struck and some hundreds have been restored. An order of sums that differs in the last bit, as for
+  // some packings, has not grown yet: after 500 more it is 2e-3 d, for what the rain stirs is chaotic
+  straight.run(read_bed(b) + "run 0\n" + rain + compact + "run 400\nwrite_restart compact.restart\nrun 300\n");
   const std::string from = head(b) + "read_restart compact.restart\nneighbor 0.0004 bin\nneigh_modify delay 0\n" + body(b) +
                            "fix integr all nve/sphere\nthermo 100000\nthermo_modify norm no\n";
   Engine again;
   again.run(from + compact + "run 0\n");
   EXPECT_GT(f(again, 3), 500);
-  again.run("run 800\n");
+  again.run("run 300\n");
+  EXPECT_GT(f(straight, 7), 200) << "restored: the rain has not struck yet";
   for (const int n : {1, 2, 3}) EXPECT_EQ(f(again, n), f(straight, n)) << "f_cull[" << n << "]";
+  for (Engine* e : {&straight, &again}) expect_all_there(*e, "cull", 1364);
   straight.run("unfix cull\nrun 0\n");
   again.run("unfix cull\nrun 0\n");
   const double apart = largest_difference(straight.state(), again.state(), &Granule::x);
@@ -169,9 +195,8 @@ TEST(CompactScenes, ARestartGoesOnWhereItStopped) {
   file.replace(file.find("compact.restart"), 15, "exact.restart");
   back.run(file + compact + "run 0\nunfix cull\nrun 0\n");
   exact.run("unfix cull\nrun 0\n");
-  EXPECT_EQ(exact.state().size(), straight.state().size());
-  EXPECT_EQ(back.state().size(), straight.state().size());
-  if (straight.rank() == 0) std::printf("after 800 steps: %.3g d apart\n", apart / diameter);
+  for (Engine* e : {&straight, &again, &exact, &back}) EXPECT_EQ(e->state().size(), 1364u);
+  if (straight.rank() == 0) std::printf("after 300 steps: %.3g d apart\n", apart / diameter);
 }
 
 }  // namespace

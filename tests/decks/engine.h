@@ -5,6 +5,7 @@
 
 #include <array>
 #include <map>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,9 @@ double largest_difference(const State& a, const State& b, Vec Granule::*what);
 /// Expects the same tags, each with its type, radius and mass to the bit.
 void expect_same_granules(const State& a, const State& b);
 double largest(const State& a, Vec Granule::*what);
+/// Expects that so many granules went in and none is lost: `cull` names a fix solid/cull, what it says of atoms is what the
+/// engine's own arrays hold, and the rest is in its store. Collective.
+void expect_all_there(Engine& e, const std::string& cull, std::size_t granules);
 
 /// What a bed is made of.
 struct Bed {
@@ -64,6 +68,8 @@ struct Bed {
   double side = 0.026;  // m, square base
   double dt = 3e-5;     // s
   std::string extra;    // lines after the walls
+
+  friend void PrintTo(const Bed& bed, std::ostream* out) { *out << bed.name; }
 };
 
 std::string head(const Bed& bed);      ///< up to the box

@@ -64,7 +64,7 @@ void throw_spinning(Engine& e, const Vector3d& velocity, const Vector3d& spin) {
 }
 
 struct Ledger {
-  double count = 0, mass = 0;
+  double mass = 0;
   Vector3d momentum = Vector3d::Zero(), turning = Vector3d::Zero();  // about the origin
 };
 
@@ -73,13 +73,11 @@ Ledger ledger(Engine& e, bool culled) {
   Ledger l;
   for (const auto& g : e.state()) {
     const Granule& a = g.second;
-    l.count += 1;
     l.mass += a.mass;
     l.momentum += a.mass * eigen(a.v);
     l.turning += a.mass * eigen(a.x).cross(eigen(a.v)) + 0.4 * a.mass * a.radius * a.radius * eigen(a.omega);
   }
   if (!culled) return l;
-  l.count += e.vector("cull", 3);
   l.mass += e.vector("cull", 5);
   for (int d = 0; d < 3; ++d) {
     l.momentum[d] += e.vector("cull", 13 + d);
@@ -172,15 +170,15 @@ TEST(Motion, FreeFlightKeepsMomentumAndTurnsAsARigidBodyDoes) {
     worst[0] = std::max(worst[0], (now.momentum - locked.momentum).norm() / locked.momentum.norm());
     worst[1] = std::max(worst[1], (now.turning - locked.turning).norm() / locked.turning.norm());
   }
-  EXPECT_LE(worst[0], 1e-10);
-  EXPECT_LE(worst[1], 1e-10);
+  EXPECT_LE(worst[0], 1e-11);  // 10,000 roundings
+  EXPECT_LE(worst[1], 1e-11);
   e.run("unfix cull\nrun 0\n");
   const State end = e.state();
   double residual = 0;
   const Eigen::Matrix3d turned = rotation_between(start, end, &residual);
   const double off = (turned - flight(start, 10000 * dt)).norm();
-  EXPECT_LE(off, 1e-6);
-  EXPECT_LE(residual, 1e-10 * diameter);
+  EXPECT_LE(off, 1e-8);
+  EXPECT_LE(residual, 1e-12 * diameter);
   if (e.rank() == 0)
     std::printf(
         "10,000 steps, %.3g rad: momentum constant to %.2g, angular momentum to %.2g, orientation off the free top's by %.2g, "
@@ -212,9 +210,9 @@ TEST(Motion, FreeFlightIsThatOfTheUnculledMass) {
   const double apart = largest_difference(at_end[0], at_end[1], &Granule::x);
   const double momentum = (end[1].momentum - end[0].momentum).norm() / end[0].momentum.norm();
   const double turning = (end[1].turning - end[0].turning).norm() / end[0].turning.norm();
-  EXPECT_LE(momentum, 1e-6);
-  EXPECT_LE(turning, 1e-6);
-  EXPECT_LE(apart, 1e-6 * way);
+  EXPECT_LE(momentum, 1e-13);
+  EXPECT_LE(turning, 1e-11);
+  EXPECT_LE(apart, 1e-6 * way);  // of the unculled mass's contacts, which give
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   if (rank == 0)
@@ -271,7 +269,37 @@ TEST(Motion, RestoreAfterARigidMotionIsTheSamePackingTurned) {
         "%.2g "
         "of 100 weights\n",
         angle, residual / diameter, history_off[0] / scale[0], history_off[1] / scale[1], off / contact_force);
-  EXPECT_LE(off, 1e-2 * contact_force);
+  EXPECT_LE(off, 1e-4 * contact_force);
+}
+
+TEST(Motion, ABodyFallsOnWhileOthersAreGrounded) {
+  // a block falls as one body; meanwhile single granules come to rest on the floor, are culled and grounded, one after the other
+  std::string singles;
+  for (int k = 0; k < 4; ++k) {
+    char line[80];
+    std::snprintf(line, sizeof line, "create_atoms 1 single %g 0.07 %g units box\n", 0.01 + 0.01 * k, 0.0013 + 2e-5 * k);
+    singles += line;
+  }
+  Engine e;
+  e.run(sticky_block(singles) +
+        "fix grav all gravity 9.81 vector 0 0 -1\nfix floor all wall/gran model hertz tangential history cohesion sjkr "
+        "rolling_friction epsd2 primitive type 1 zplane 0\n"
+        "fix cull all solid/cull exterior sleep depth 0 every 25 calm 2\nrun 0\n");
+  const auto block_momentum = [&] {  // kg m/s, upwards: all but what the single granules have that are atoms; stored ones stand
+    double p = ledger(e, true).momentum[2];
+    for (const auto& g : e.state())
+      if (g.first > 240) p -= g.second.mass * g.second.v[2];
+    return p;
+  };
+  for (int k = 0; k < 20 && e.vector("cull", 2) + e.vector("cull", 3) < 240; ++k) e.run("run 25\n");
+  ASSERT_GE(e.vector("cull", 2) + e.vector("cull", 3), 240) << "the block should be culled in the air";
+  const double begin = block_momentum(), mass = 240 * e.state().begin()->second.mass;
+  const int steps = 1500;  // it hits the floor after 2,500
+  e.run("run " + std::to_string(steps) + "\n");
+  EXPECT_EQ(e.vector("cull", 1), 0) << "all are culled: the block and, by now, each single granule";
+  const double due = -9.81 * mass * steps * dt, fell = block_momentum() - begin;
+  EXPECT_NEAR(fell, due, 1e-9 * std::abs(due));
+  if (e.rank() == 0) std::printf("fell by %.12g of what is due\n", fell / due);
 }
 
 TEST(Motion, LedgerInFlight) {
@@ -295,7 +323,7 @@ TEST(Motion, LedgerInFlight) {
   for (int k = 0; k < 150; ++k) {
     e.run("run 20 pre no post no\n");
     const Ledger now = ledger(e, true);
-    EXPECT_EQ(now.count, before.count);
+    expect_all_there(e, "cull", 243);
     mass_off = std::max(mass_off, std::abs(now.mass - before.mass) / before.mass);
     worst[0] = std::max(worst[0], (now.momentum - before.momentum).norm() / momenta);
     worst[1] = std::max(worst[1], (now.turning - before.turning).norm() / turnings);
@@ -327,7 +355,7 @@ TEST(Motion, AMassFallsOnTheFloorAndNothingGoesThrough) {
   EXPECT_GT(falling, 200) << "it falls as one mass, and is culled while it does";
   for (int k = 0; k < 20; ++k) {
     e.run("run 250\n");
-    EXPECT_EQ(e.vector("cull", 1) + e.vector("cull", 2) + e.vector("cull", 3), 1300);
+    expect_all_there(e, "cull", 1300);
   }
   EXPECT_GT(e.vector("cull", 7), 500) << "the floor woke it";
   e.run("unfix cull\nrun 0\n");
@@ -362,29 +390,42 @@ TEST(Motion, AMassThatLeavesTheBoxIsGoneAsItWouldBeWithoutTheFix) {
   if (rank == 0) std::printf("half out: %zu left unculled, %zu culled\n", left[0], left[1]);
   EXPECT_GT(left[0], 20u);
   EXPECT_LT(left[0], 220u);
-  EXPECT_NEAR(static_cast<double>(left[1]), static_cast<double>(left[0]), 3);
+  EXPECT_NEAR(static_cast<double>(left[1]), static_cast<double>(left[0]), 1);  // one may stand in the side of the box
 }
 
 TEST(Motion, ABodyThatLosesItsSupportFalls) {
   Bed bed;
   bed.name = "support";
-  Engine e;
-  e.run(read_bed(bed) + "run 0\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.5\nrun 500\n");
-  ASSERT_GT(e.vector("cull", 3), 100);
-  const auto height = [&] {
-    double mass = e.vector("cull", 5), moment = mass * e.vector("cull", 22);
-    for (const auto& g : e.state()) {
-      mass += g.second.mass;
-      moment += g.second.mass * g.second.x[2];
+  double fallen[2];
+  for (const bool culled : {false, true}) {
+    Engine e;
+    e.run(read_bed(bed) + "run 0\n" + (culled ? "fix cull all solid/cull exterior live every 50 calm 2 depth 1.5\n" : "") +
+          "run 500\n");
+    const auto height = [&] {
+      double mass = culled ? e.vector("cull", 5) : 0, moment = culled ? mass * e.vector("cull", 22) : 0;
+      for (const auto& g : e.state()) {
+        mass += g.second.mass;
+        moment += g.second.mass * g.second.x[2];
+      }
+      return moment / mass;
+    };
+    if (culled) {
+      ASSERT_GT(e.vector("cull", 3), 100);
     }
-    return moment / mass;
-  };
-  const double before = height();
-  e.run("unfix z1\nfix z1 all wall/gran " + bed.contact + " primitive type 1 zplane -0.0019\nrun 150\n");
-  const double seconds = 150 * dt;
-  EXPECT_GT(e.vector("cull", 7), 100) << "what rested on the floor wakes";
-  // side walls hold back a little
-  EXPECT_NEAR(before - height(), 0.5 * 9.81 * seconds * seconds, 0.25 * 0.5 * 9.81 * seconds * seconds);
+    const double before = height();
+    e.run("unfix z1\nfix z1 all wall/gran " + bed.contact + " primitive type 1 zplane -0.0019\nrun 150\n");
+    if (culled) {
+      EXPECT_GT(e.vector("cull", 7), 100) << "what rested on the floor wakes";
+    }
+    fallen[culled] = before - height();
+  }
+  const double seconds = 150 * dt, way = 0.5 * 9.81 * seconds * seconds;
+  EXPECT_LT(fallen[0], way);
+  EXPECT_GT(fallen[0], 0.7 * way) << "side walls hold back a little";
+  EXPECT_NEAR(fallen[1], fallen[0], 0.03 * fallen[0]);  // some steps go by before a granule is woken: 2 % were measured
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  if (rank == 0) std::printf("it fell %.4g of the way of a free fall, unculled %.4g\n", fallen[1] / way, fallen[0] / way);
 }
 
 }  // namespace

@@ -13,6 +13,8 @@ constexpr double diameter = 0.0026;
 struct Case {
   Bed bed;
   std::string cover;  // keywords of the fix
+
+  friend void PrintTo(const Case& c, std::ostream* out) { *out << c.bed.name << ", " << c.cover; }
 };
 
 class NoOp : public testing::TestWithParam<Case> {};

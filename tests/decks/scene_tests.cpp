@@ -5,7 +5,13 @@
 #include <cstdio>
 #include <fstream>
 
+#include "atom.h"
 #include "engine.h"
+#include "force.h"
+#include "lammps.h"
+#include "neigh_list.h"
+#include "pair.h"
+#include "pair_force.h"
 
 namespace decks {
 namespace {
@@ -55,7 +61,7 @@ TEST(Scenes, ABedThatSleepsStillWeighsOnItsWalls) {
                          e.vector("floor", 5)};
   const double lever = std::abs(load[0]) * bed.side;
   e.run("fix cull all solid/cull exterior sleep every 50\nrun 1500\n");
-  EXPECT_EQ(f(e, 1) + f(e, 2) + f(e, 3), 1300);
+  expect_all_there(e, "cull", 1300);
   EXPECT_GT(f(e, 3), 1250) << "granules at the walls are in the store too";
   const auto weighs = [&] {
     EXPECT_NEAR(e.vector("floor", 3), load[0], 1e-3 * std::abs(load[0]));
@@ -105,8 +111,9 @@ TEST(Scenes, GranulesThatSpinOnTheSpotSleepAndGoOnSpinning) {
         "set group all diameter 0.0026\nset group all density 2500\nfix integr all nve/sphere\nthermo 100000\n"
         "thermo_modify norm no\nrun 3000\n" +
         spins + "fix cull all solid/cull exterior sleep every 50\nrun 1500\n");
+  expect_all_there(e, "cull", 24);
+  EXPECT_EQ(e.state().size(), 1u) << "all but the highest tag are in the store";
   EXPECT_EQ(f(e, 1), 0);
-  EXPECT_EQ(f(e, 3), 23) << "all but the highest tag";
   const double weight = 24 * e.state().at(24).mass * 9.81;
   EXPECT_NEAR(std::abs(e.vector("floor", 3)), weight, 1e-4 * weight);
   e.run("unfix cull\nrun 0\n");
@@ -120,10 +127,16 @@ TEST(Scenes, WhatRestsOnAFloorThatIsUnfixedFalls) {
   Engine e;
   e.run(read_bed(bed) + "fix cull all solid/cull exterior sleep every 50\nrun 1500\n");
   ASSERT_GT(f(e, 3), 1250);
-  const double weight = std::abs(e.vector("floor", 3)), friction = e.vector("side", 3);
-  // the side is the only mesh now: it must not be given what the floor bore
-  e.run("unfix meshes\nunfix floor\nfix meshes all wall/gran " + bed.contact + " mesh n_meshes 1 meshes side\nrun 1\n");
-  EXPECT_NEAR(e.vector("side", 3), friction, 0.05 * weight);
+  const double weight = std::abs(e.vector("floor", 3));
+  // the side is the only mesh now: it must not be given what the floor bore. A new wall has no histories, so no friction yet
+  const std::string no_floor =
+      "unfix meshes\nunfix floor\nfix meshes all wall/gran " + bed.contact + " mesh n_meshes 1 meshes side\nrun 1\n";
+  Engine never;
+  never.run(read_bed(bed) + "run 1500\n" + no_floor);
+  e.run(no_floor);
+  EXPECT_NEAR(e.vector("side", 1), never.vector("side", 1), 1e-3 * weight);
+  EXPECT_NEAR(e.vector("side", 3), never.vector("side", 3), 0.01 * weight);  // what has begun to fall rubs: 0.6 % of the weight
+  EXPECT_GT(std::abs(e.vector("side", 1)), 0.1 * weight);
   e.run("run 400\n");
   EXPECT_GT(f(e, 7), 1250) << "what rested on the floor wakes";
   e.run("unfix cull\nrun 0\n");
@@ -181,6 +194,7 @@ TEST(Scenes, RestartWhileCulledGoesOnAsIfItHadNotStopped) {
   EXPECT_GT(f(again, 3), 100);
   again.run("run 1000\n");
   for (const int n : {1, 2, 3}) EXPECT_EQ(f(again, n), f(straight, n)) << "f_cull[" << n << "]";
+  for (Engine* e : {&straight, &again}) expect_all_there(*e, "cull", 1302);
   EXPECT_EQ(f(again, 6), f(straight, 6)) << "culled so far";
   EXPECT_NEAR(f(again, 5), f(straight, 5), 1e-12 * f(straight, 5)) << "stored mass";
   straight.run("unfix cull\nrun 0\n");
@@ -205,13 +219,15 @@ TEST(Scenes, FinesPouredOnACoarseBedNeverTouchAnInteriorGranule) {
       "lattice sc 0.0006\nregion fines block 0.009 0.017 0.009 0.017 0.040 0.046 units box\n"
       "create_atoms 2 region fines\ngroup fines id > 700\nset group fines diameter 0.00026\n"
       "set group fines density 2500\nvelocity fines set 0 0 -1.0\ntimestep 0.000003\n";
+  expect_all_there(e, "cull", 700);
+  const std::size_t atoms = e.state().size();
   e.run(pour);
-  const std::size_t fines = e.state().size() + static_cast<std::size_t>(before) - 700;
+  const std::size_t fines = e.state().size() - atoms;
   ASSERT_GT(fines, 500u);
   double lowest = 1;
   for (int k = 0; k < 40; ++k) {
     e.run("run 250\n");
-    EXPECT_EQ(f(e, 1) + f(e, 2) + f(e, 3), 700.0 + static_cast<double>(fines));
+    expect_all_there(e, "cull", 700 + fines);
     for (const auto& g : e.state())
       if (g.first > 700) lowest = std::min(lowest, g.second.x[2]);
   }
@@ -276,8 +292,10 @@ double load_change_at_wake_up(double plate_speed) {
 TEST(Scenes, ASlowAndAFastRampWakeAtTheSameLoad) {
   const double middle = load_change_at_wake_up(3e-7), slow = load_change_at_wake_up(3e-8), fast = load_change_at_wake_up(3e-6);
   EXPECT_GT(middle, 0);
-  EXPECT_NEAR(slow, middle, 0.05 * middle);
-  EXPECT_NEAR(fast, middle, 0.05 * middle);
+  // 0.5 % and 2.5 % were measured, for other packings less: while a fast plate's push is on its way to the granule that wakes,
+  // the plate goes on
+  EXPECT_NEAR(slow, middle, 0.01 * middle);
+  EXPECT_NEAR(fast, middle, 0.04 * middle);
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   if (rank == 0) std::printf("first wake-up at +%.5g N (10 x slower: +%.5g N, 10 x faster: +%.5g N)\n", middle, slow, fast);
@@ -285,6 +303,26 @@ TEST(Scenes, ASlowAndAFastRampWakeAtTheSameLoad) {
 
 double distance(const Vec& a, const Vec& b) {
   return std::sqrt(std::pow(a[0] - b[0], 2) + std::pow(a[1] - b[1], 2) + std::pow(a[2] - b[2], 2));
+}
+
+/// Sum of the normal forces that its contacts with granules press on each granule (N), by tag. Collective.
+std::vector<double> normal_loads(Engine& e) {
+  const LAMMPS_NS::Atom* atom = e.lammps()->atom;
+  const LAMMPS_NS::NeighList* list = e.lammps()->force->pair->list;
+  solidcull::PairForce law(e.lammps());
+  std::vector<double> mine(static_cast<std::size_t>(atom->natoms) + 1), all(mine.size());
+  for (int n = 0; n < list->inum; ++n) {
+    const int i = list->ilist[n];
+    for (int k = 0; k < list->numneigh[i]; ++k) {
+      const int j = list->firstneigh[i][k];
+      const Vec apart = {atom->x[j][0] - atom->x[i][0], atom->x[j][1] - atom->x[i][1], atom->x[j][2] - atom->x[i][2]};
+      const double normal = std::abs(law.on_first(i, k).dot(solidcull::Vec3(apart[0], apart[1], apart[2]).normalized()));
+      mine[atom->tag[i]] += normal;
+      if (j < atom->nlocal) mine[atom->tag[j]] += normal;  // a ghost is counted by its own rank
+    }
+  }
+  MPI_Allreduce(mine.data(), all.data(), static_cast<int>(all.size()), MPI_DOUBLE, MPI_SUM, MPI_COMM_WORLD);
+  return all;
 }
 
 TEST(Scenes, ABlowOfGivenExcessCarvesTheBallsOfTheLaw) {
@@ -295,21 +333,26 @@ TEST(Scenes, ABlowOfGivenExcessCarvesTheBallsOfTheLaw) {
   Engine e;
   e.run(read_bed(bed) + "run 50\n");
   const State whole = e.state();
+  const std::vector<double> loads = normal_loads(e);
   double mean_diameter = 0;
   for (const auto& g : whole) mean_diameter += 2 * g.second.radius / static_cast<double>(whole.size());
-  e.run("fix cull all solid/cull exterior live every 50 calm 2 depth 1.5 tolerance 3 0 carve 1.5 4\nrun 300\n");
+  e.run("fix cull all solid/cull exterior live every 50 calm 2 depth 1.5 tolerance 3 0 carve 1.5 4\nrun 325\n");
+  // half-way between two looks: what the last one found is done, and no other is on its way
   ASSERT_EQ(f(e, 8), 0);
   const int bit = e.group_bit("cull_interface");
   const State before = e.state();
 
-  // two interface granules away from walls, their balls overlapping: struck with 2 and 4 times the tolerance
+  // two interface granules away from walls, their balls overlapping: struck with 2 and 4 times the tolerance. That is 3 weights
+  // for those that bear 6 or more, and less for others
+  const auto bears_enough = [&](int tag) { return loads[tag] > 7 * whole.at(tag).mass * 9.81; };
   std::vector<int> struck;
   for (const Vec& aim : {Vec{0.014, 0.017, 0.03}, Vec{0.019, 0.017, 0.03}}) {
     int best = 0;
     for (const auto& g : before)
-      if ((g.second.mask & bit) && (struck.empty() || g.first != struck[0]) &&
+      if ((g.second.mask & bit) && bears_enough(g.first) && (struck.empty() || g.first != struck[0]) &&
           (!best || distance(g.second.x, aim) < distance(before.at(best).x, aim)))
         best = g.first;
+    ASSERT_NE(best, 0);
     struck.push_back(best);
   }
   const double excess[2] = {2, 4};
@@ -321,7 +364,7 @@ TEST(Scenes, ABlowOfGivenExcessCarvesTheBallsOfTheLaw) {
     hits += "group " + name + " id " + std::to_string(struck[k]) + "\nfix " + name + " " + name + " addforce 0 0 " + force + "\n";
   }
   e.run(hits + "run 0\n");
-  for (int k = 0; k < 30 && f(e, 8) == 0; ++k) e.run("run 1 pre no post no\n");
+  for (int k = 0; k < 24 && f(e, 8) == 0; ++k) e.run("run 1 pre no post no\n");
   ASSERT_EQ(f(e, 8), 2) << "two carves, of one step together";
 
   const State after = e.state();
@@ -359,10 +402,12 @@ TEST(Scenes, TheRegionHoldsTheBodiesAndNothingElse) {
       "variable both equal count(all,solid)+count(all,rest)\nvariable one atom 1\ncompute inside all reduce/region solid sum "
       "v_one\n"
       "variable inside equal c_inside\nthermo_style custom step atoms c_inside\nrun 0\n");
-  EXPECT_EQ(e.variable("both"), f(e, 1) + f(e, 2));
+  expect_all_there(e, "cull", 1300);
+  EXPECT_EQ(e.variable("both"), static_cast<double>(e.state().size()));
   EXPECT_EQ(e.variable("held"), e.variable("inside"));
   // the interface granules and no other; at rough places of the surface an exterior centre may lie within half a voxel
   EXPECT_NEAR(e.variable("held"), f(e, 2), 0.02 * f(e, 2));
+  if (e.rank() == 0) std::printf("the region holds %g atoms, %g are interface granules\n", e.variable("held"), f(e, 2));
   e.run("thermo_style custom step atoms\nuncompute inside\nregion solid delete\nregion rest delete\nunfix cull\nrun 0\n");
 }
 
@@ -372,9 +417,11 @@ TEST(Scenes, GravityThatTurnsWakesEverything) {
   Engine e;
   e.run(read_bed(bed) + "run 0\nfix cull all solid/cull exterior live every 50 calm 2 depth 1.5\nrun 500\n");
   ASSERT_GT(f(e, 3), 100);
+  expect_all_there(e, "cull", 1300);
   e.run("unfix grav\nfix grav all gravity 9.81 vector 0.6 0 -1\nrun 30\n");
   EXPECT_EQ(f(e, 3), 0);
   EXPECT_EQ(f(e, 2), 0);
+  expect_all_there(e, "cull", 1300);
 }
 
 TEST(Scenes, AWallThatGoesWakesWhatTouchedIt) {
@@ -386,6 +433,7 @@ TEST(Scenes, AWallThatGoesWakesWhatTouchedIt) {
   ASSERT_GT(before, 100);
   e.run("unfix x2\nrun 500\n");
   EXPECT_GT(f(e, 7), 100) << "restored";
+  expect_all_there(e, "cull", 1300);
   double farthest = 0;
   for (const auto& g : e.state()) farthest = std::max(farthest, g.second.x[0]);
   EXPECT_GT(farthest, bed.side) << "nothing flows out";
@@ -396,10 +444,10 @@ TEST(Scenes, ARunThatStartsWithAnEmptyBoxIsCulledToo) {
   bed.name = "pour";
   Engine e;
   e.run(pouring(bed) + "fix cull all solid/cull\nfix visc all viscous 0.002\nrun 12000\n");
-  EXPECT_EQ(f(e, 1) + f(e, 2) + f(e, 3), bed.granules);
+  expect_all_there(e, "cull", bed.granules);
   // it still trembles: what spins about a lone contact is stopped by hand
   for (int k = 0; k < 4; ++k) e.run("velocity all set 0 0 0\nset group all omegax 0 omegay 0 omegaz 0\nrun 1500\n");
-  EXPECT_EQ(f(e, 1) + f(e, 2) + f(e, 3), bed.granules);
+  expect_all_there(e, "cull", bed.granules);
   EXPECT_GT(f(e, 3), 100);
   if (e.rank() == 0) std::printf("%g interior granules\n", f(e, 3));
 }
@@ -411,6 +459,7 @@ TEST(Scenes, GranulesLeaveByTheStoreAndComeBackWithTheirIds) {
   const State atoms = e.state();
   EXPECT_TRUE(atoms.count(1300)) << "the highest tag must stay an atom: new atoms are numbered from it";
   ASSERT_GT(f(e, 3), 100);
+  expect_all_there(e, "cull", 1300);
   e.run(
       "create_atoms 1 single 0.013 0.013 0.06\ngroup new id > 1300\nset group new diameter 0.0026\nset group new density 2500\n");
   EXPECT_TRUE(e.state().count(1301));

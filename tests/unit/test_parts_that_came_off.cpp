@@ -56,7 +56,8 @@ struct Net {
     }
     return reached;
   }
-  /// The connected parts that hold one of these; all but one must have come off, and the largest must not if it is alone that large.
+  /// The connected parts that hold one of these; all but one must have come off, and the largest must not if it is alone that
+  /// large.
   void expect_all_but_the_largest(const std::vector<std::int64_t>& cut) const {
     std::set<Part> all;
     for (const std::int64_t tag : cut) all.insert(all_around(tag));

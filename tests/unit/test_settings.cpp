@@ -78,7 +78,7 @@ TEST(Settings, without_keywords_are_the_defaults) {
   EXPECT_EQ(s.carve_radius, 2.0);
   EXPECT_EQ(s.carve_cap, 4.0);
   EXPECT_EQ(s.motion, Motion::rigid);
-  EXPECT_EQ(s.walls, Walls::closed);
+  EXPECT_EQ(s.walls, WallCover::closed);
   EXPECT_EQ(s.store, Store::exact);
   EXPECT_EQ(s.restore, Restore::exact);
   EXPECT_EQ(s.voxel, 0.5);
@@ -98,7 +98,7 @@ TEST(Settings, every_keyword_is_parsed) {
   due.carve_radius = 1.5;
   due.carve_cap = 6;
   due.motion = Motion::fixed;
-  due.walls = Walls::surface;
+  due.walls = WallCover::surface;
   due.voxel = 0.25;
   due.meshes = {{100, "out/mesh.*.vdb"}};
   due.beds = {{200, "bed.vtp"}};

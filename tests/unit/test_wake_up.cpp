@@ -25,7 +25,7 @@ TEST(WakeUpLaw, who_bears_little_sleeps_through_half_of_that) {
   EXPECT_DOUBLE_EQ(absolute.tolerance(mass, 6 * weight), 3 * weight);  // from here on A
   EXPECT_DOUBLE_EQ(absolute.tolerance(mass, 7 * weight), 3 * weight);
   EXPECT_DOUBLE_EQ(absolute.tolerance(mass, 0), 0.45 * weight);  // in free flight
-  EXPECT_DOUBLE_EQ(absolute.tolerance(mass, -1), 3 * weight);   // not known
+  EXPECT_DOUBLE_EQ(absolute.tolerance(mass, -1), 3 * weight);    // not known
   EXPECT_DOUBLE_EQ(law.tolerance(mass, -1), 3 * weight);
 }
 

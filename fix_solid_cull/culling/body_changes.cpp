@@ -1,0 +1,40 @@
+#include "body_changes.h"
+
+namespace solidcull {
+
+void split_bodies(Solid& solid, Shell& shell, const AtomIndex& index, const GranuleMasses& masses) {
+  solid.split(masses.by_tag(), [&](std::int64_t tag, int body, const Vec3& place) {
+    shell.stands(index.at(tag), {body, place});
+  });
+}
+
+std::vector<Solid::Merge> adopt_places(const Atoms& atoms, Solid& solid, Shell& shell, Arrivals& arrivals) {
+  const SolidBodies& bodies = solid.bodies();
+  for (int i = 0; i < atoms.owned; ++i) {
+    if (!shell[i].locked || shell[i].body == Locked::arriving) continue;
+    const int before = shell[i].body, body = bodies.body_of(atoms.tag[i]);
+    if (before == body) continue;
+    const Pose &from = bodies.pose(before), &to = bodies.pose(body);
+    if (from != to) {
+      shell.reframe(i, from, to);
+      solid.turn_contacts(atoms.tag[i], to.turn().transpose() * from.turn());
+    }
+    shell.set_body(i, body);
+  }
+  Arrivals moved;
+  arrivals.for_each([&](std::int64_t tag, Arrival a) {
+    const int body = bodies.body_of(tag);
+    const Pose &from = bodies.pose(a.at.body), &to = bodies.pose(body);
+    if (from != to) a.at.position = to.to_frame(from.to_world(a.at.position));
+    a.at.body = body;
+    moved[tag] = a;
+  });
+  arrivals = std::move(moved);
+  return solid.adopt_swallowed();
+}
+
+void label_bodies(const Atoms& atoms, Shell& shell, const BodyGroups& groups) {
+  for (int i = 0; i < atoms.owned; ++i) shell.label(i, shell[i].locked ? groups.key_of(shell[i].body) : 0);
+}
+
+}  // namespace solidcull

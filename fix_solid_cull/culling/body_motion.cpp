@@ -1,0 +1,216 @@
+#include "body_motion.h"
+
+#include <algorithm>
+
+#include "release.h"
+
+namespace solidcull {
+
+void BodyMotion::refresh() {
+  if (!stale_) return;
+  stale_ = false;
+  active_.clear();
+  atoms_.clear();
+  slot_.clear();
+  place_.clear();
+  riding_.clear();
+  const Atoms& atoms = ports_.atoms;
+  FlatMap<int> slot;
+  FlatMap<char> has_atoms;
+  for (int i = 0; i < atoms.owned; ++i)
+    if (shell_[i].in_body()) has_atoms[shell_[i].body] = 1;
+  const Vec3 g = ports_.run.gravity();
+  for (auto& [number, body] : solid_.bodies_in_motion()) {
+    // what sleeps on the ground and has no atoms costs nothing
+    const int spanning = groups_.spanning(number);
+    if (body.grounded && spanning < 0 && !has_atoms.contains(number) && solid_.walls_bear(number, g)) continue;
+    slot[number] = static_cast<int>(active_.size());
+    active_.push_back({number, &body});
+    active_.back().stands = solid_.stands(number);
+    active_.back().spanning = spanning;
+  }
+  solid_.store().for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
+    const int* s = slot.find(body);
+    if (!s && !solid_.exists(body))
+      throw InternalError("interior granules belong to body " + std::to_string(body) + ", which is not there");
+    if (!s || active_[*s].stands) return;
+    const SolidBody& b = *active_[*s].body;
+    active_[*s].reach = (b.pose.to_world(0.5 * (lo + hi)) - b.motion.centre()).norm() + 0.5 * (hi - lo).norm();
+  });
+  for (int i = 0; i < atoms.owned; ++i) {
+    if (!shell_[i].locked || shell_[i].body == Locked::arriving) continue;
+    const int* s = slot.find(shell_[i].body);
+    if (!s) throw InternalError("interface granule " + std::to_string(atoms.tag[i]) + " belongs to no body");
+    atoms_.push_back(i);
+    slot_.push_back(static_cast<std::size_t>(*s));
+    if (!active_[*s].stands) riding_.push_back(atoms_.size() - 1);
+    place_.push_back(shell_[i].place);
+  }
+}
+
+void BodyMotion::refresh_in_step() {
+  const std::vector<ActiveBody> before = active_;
+  refresh();
+  FlatMap<const ActiveBody*> known;
+  for (const ActiveBody& a : before) known[a.number] = &a;
+  for (ActiveBody& a : active_) {
+    const ActiveBody* const* then = known.find(a.number);
+    if (!then || a.stands) continue;
+    a.force = (*then)->force;
+    a.torque = (*then)->torque;
+    a.way = (*then)->way;
+  }
+}
+
+// ------------------------------------------------------------------------------------------------------------ loads
+
+/// The load on interface granule number k goes to its body, about the frame's origin for now.
+inline void BodyMotion::add_to_body(std::size_t k, const Vec3& contact, const Vec3& torque) {
+  ActiveBody& a = active_[slot_[k]];
+  a.force += contact;
+  a.torque += (a.body->pose.turn() * place_[k]).cross(contact) + torque;
+}
+
+void BodyMotion::take_loads() {
+  largest_excess_ = 0;
+  const bool moves = scales_.rigid();
+  const Vec3 g = ports_.run.gravity();
+  const WakeUpLaw& law = scales_.wake_up();
+  Atoms& atoms = ports_.atoms;
+  for (ActiveBody& a : active_) a.force = a.torque = a.change = Vec3::Zero();
+  for (std::size_t k = 0; k < atoms_.size(); ++k) {
+    const int i = atoms_[k];
+    const Vec3 in_world = atoms.force(i);
+    ActiveBody& a = active_[slot_[k]];
+    if (moves && !a.stands) add_to_body(k, in_world - atoms.mass[i] * g, vec(atoms.torque + 3 * std::size_t(i)));
+    if (a.stands) a.change += in_world - atoms.mass[i] * g;
+    const double tolerance = law.tolerance(atoms.mass[i], shell_[i].normal_load);
+    largest_excess_ = std::max(largest_excess_, shell_.take_load(i, a.body->pose.turned_to_frame(in_world), tolerance));
+    atoms.clear_load(i);
+  }
+  if (scales_.sleeping())
+    for (ActiveBody& a : active_)
+      if (a.stands) a.change += solid_.wall_loads().force(a.number) + a.body->mass.mass * g;
+  if (!moves) return;
+  // contacts and other forces on interface granules are there; gravity pulls the whole mass
+  for (ActiveBody& a : active_) a.torque += (a.body->pose.origin() - a.body->motion.centre()).cross(a.force);
+  sum_over_ranks();
+  for (ActiveBody& a : active_) a.force += a.body->motion.mass() * g;
+}
+
+void BodyMotion::sum_over_ranks() {
+  if (groups_.spanning_bodies() == 0) return;
+  constexpr int numbers = 9;
+  std::vector<double> sums(numbers * groups_.spanning_bodies(), 0.0);
+  for (const ActiveBody& a : active_) {
+    if (a.spanning < 0) continue;
+    double* of = &sums[static_cast<std::size_t>(numbers * a.spanning)];
+    for (int d = 0; d < 3; ++d) {
+      of[d] += a.force[d];
+      of[3 + d] += a.torque[d];
+      of[6 + d] += a.change[d];
+    }
+  }
+  ports_.ranks.sum(sums.data(), static_cast<int>(sums.size()));
+  for (ActiveBody& a : active_) {
+    if (a.spanning < 0) continue;
+    const double* of = &sums[static_cast<std::size_t>(numbers * a.spanning)];
+    a.force = vec(of);
+    a.torque = vec(of + 3);
+    a.change = vec(of + 6);
+  }
+}
+
+// ------------------------------------------------------------------------------------------------------------ motion
+
+void BodyMotion::kick_and_drift() {
+  const Run& run = ports_.run;
+  const Vec3 edges = run.edges();
+  for (ActiveBody& a : active_) {
+    if (a.stands) continue;
+    SolidBody& b = *a.body;
+    b.kick(a.force, a.torque, 0.5 * run.dt);
+    b.drift(run.dt);
+    a.way += way_in_a_step(a);
+    for (int d = 0; d < 3; ++d) {
+      const double c = b.motion.centre()[d];
+      if (!run.periodic[d] || (c >= run.box.lo[d] && c < run.box.hi[d])) continue;
+      Vec3 shift = Vec3::Zero();
+      shift[d] = c < run.box.lo[d] ? edges[d] : -edges[d];
+      b.shift(shift);
+    }
+    b.take_twist();
+  }
+}
+
+void BodyMotion::kick() {
+  for (ActiveBody& a : active_) {
+    if (a.stands) continue;
+    a.body->kick(a.force, a.torque, 0.5 * ports_.run.dt);
+    a.body->take_twist();
+  }
+}
+
+double BodyMotion::way_in_a_step(const ActiveBody& a) const {
+  return a.reach > 0 ? ports_.run.dt * (a.body->motion.velocity().norm() + a.body->motion.spin().norm() * a.reach) : 0.0;
+}
+
+bool BodyMotion::comes_too_far(int steps) const {
+  return std::any_of(active_.begin(), active_.end(),
+                     [&](const ActiveBody& a) { return a.way + steps * way_in_a_step(a) > 0.5 * ports_.run.skin; });
+}
+
+bool BodyMotion::is_fast(int steps) const {
+  return std::any_of(active_.begin(), active_.end(),
+                     [&](const ActiveBody& a) { return steps * way_in_a_step(a) > 0.25 * ports_.run.skin; });
+}
+
+/// The velocity field over places in the body's frame: v = constant + gradient * place.
+struct BodyMotion::FieldInFrame {
+  Vec3 constant;
+  Eigen::Matrix3d gradient;
+  explicit FieldInFrame(const SolidBody& b) : constant(b.twist.at(b.pose.origin())) {
+    for (int d = 0; d < 3; ++d) gradient.col(d) = b.twist.spin.cross(b.pose.turn().col(d));
+  }
+  Vec3 at(const Vec3& place) const { return constant + gradient * place; }
+};
+
+std::vector<BodyMotion::FieldInFrame> BodyMotion::fields() const {
+  std::vector<FieldInFrame> fields;
+  fields.reserve(active_.size());
+  for (const ActiveBody& a : active_) fields.emplace_back(*a.body);
+  return fields;
+}
+
+void BodyMotion::place() {
+  const bool periodic = ports_.run.any_periodic();
+  const std::vector<FieldInFrame> of = fields();
+  Atoms& atoms = ports_.atoms;
+  for (const std::size_t k : riding_) {
+    const int i = atoms_[k];
+    const SolidBody& b = *active_[slot_[k]].body;
+    const Vec3 x = b.pose.to_world(place_[k]);
+    atoms.set_place(i, periodic ? solid_.nearest_image(x, atoms.place(i)) : x);
+    atoms.set_velocity(i, of[slot_[k]].at(place_[k]));
+    atoms.set_spin(i, b.twist.spin);
+  }
+}
+
+void BodyMotion::give_velocity(std::size_t k, const std::vector<FieldInFrame>& of) {
+  ports_.atoms.set_velocity(atoms_[k], of[slot_[k]].at(place_[k]));
+  ports_.atoms.set_spin(atoms_[k], active_[slot_[k]].body->twist.spin);
+}
+
+void BodyMotion::give_velocities_to_riders() {
+  const std::vector<FieldInFrame> of = fields();
+  for (const std::size_t k : riding_) give_velocity(k, of);
+}
+
+void BodyMotion::give_velocities() {
+  const std::vector<FieldInFrame> of = fields();
+  for (std::size_t k = 0; k < atoms_.size(); ++k) give_velocity(k, of);
+}
+
+void BodyMotion::release_memory() { release(atoms_, slot_, place_, riding_); }
+
+}  // namespace solidcull

@@ -1,0 +1,91 @@
+// How solid bodies move, in step with the engine's integrator (DESIGN section 7).
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "body_groups.h"
+#include "ports.h"
+#include "shell.h"
+#include "solid.h"
+
+namespace solidcull {
+
+/// A body that something is to be computed for: all but those that sleep on the ground and have no atoms. World frame.
+struct ActiveBody {
+  int number;
+  SolidBody* body;
+  bool stands = false;         ///< grounded, or all bodies are fixed
+  Vec3 change = Vec3::Zero();  ///< if it stands: what its walls must bear beyond what is frozen, for it is in balance (N)
+  Vec3 force = Vec3::Zero();   ///< if it does not: on the whole body (N)
+  Vec3 torque = Vec3::Zero();  ///< and about its centre of mass (N m)
+  double reach = 0;            ///< of its interior granules: farthest from the centre (m)
+  double way = 0;              ///< bound of their way since the last reneighbouring (m)
+  int spanning = -1;           ///< its place among the bodies that span ranks
+};
+
+/// The bodies' loads, momentum and places, and the interface granules that ride on them.
+class BodyMotion : public BodyFollower {
+ public:
+  BodyMotion(const Ports& ports, const Scales& scales, Solid& solid, Shell& shell, const BodyGroups& groups)
+      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), groups_(groups) {}
+
+  const std::vector<ActiveBody>& active() const { return active_; }
+  /// Atom indices of the interface granules, since the last refresh(); number k stands in active()[slot(k)].
+  const std::vector<int>& interface_atoms() const { return atoms_; }
+  std::size_t slot(std::size_t k) const { return slot_[k]; }
+  /// Largest load change over tolerance in this step, on this rank.
+  double largest_excess() const { return largest_excess_; }
+
+  /// Atoms or bodies are others: what was listed is to be listed anew. Local.
+  void is_stale() { stale_ = true; }
+  bool stale() const { return stale_; }
+  void grounded_or_let_go(int) override { is_stale(); }
+  /// Lists active bodies and their atoms, if they are stale. Local.
+  void refresh();
+  /// The same in the middle of a time step, between the loads and the second half of the kick: bodies that go on moving keep the
+  /// loads that were taken, and the way that they have gone. Local.
+  void refresh_in_step();
+
+  // --- a time step
+  /// Half a kick, and places. Local.
+  void kick_and_drift();
+  /// Interface granules go where their body is. Local.
+  void place();
+  /// Takes the contact forces off the interface granules, and sums them over bodies. Collective.
+  void take_loads();
+  /// The other half of the kick. Local.
+  void kick();
+  /// Interface granules that ride on moving bodies have their bodies' velocity field; all of them. Local.
+  void give_velocities_to_riders();
+  void give_velocities();
+
+  /// Whether a stored granule may have gone so far that something unseen is near: within so many steps from now. Local.
+  bool comes_too_far(int steps) const;
+  bool is_fast(int steps) const;
+
+  void release_memory();
+
+ private:
+  struct FieldInFrame;
+  std::vector<FieldInFrame> fields() const;
+  void give_velocity(std::size_t k, const std::vector<FieldInFrame>& fields);
+  void add_to_body(std::size_t k, const Vec3& contact, const Vec3& torque);
+  void sum_over_ranks();
+  double way_in_a_step(const ActiveBody& a) const;
+
+  const Ports& ports_;
+  const Scales& scales_;
+  Solid& solid_;
+  Shell& shell_;
+  const BodyGroups& groups_;
+  std::vector<ActiveBody> active_;
+  std::vector<int> atoms_;           // indices of interface granules
+  std::vector<std::size_t> slot_;    // their bodies in active_
+  std::vector<Vec3> place_;          // and places there
+  std::vector<std::size_t> riding_;  // those of them whose bodies move
+  bool stale_ = true;
+  double largest_excess_ = 0;
+};
+
+}  // namespace solidcull

@@ -1,0 +1,42 @@
+// How much is culled over all ranks, as of the last time that it was counted.
+#pragma once
+
+#include <cstdint>
+
+#include "ports.h"
+#include "solid.h"
+
+namespace solidcull {
+
+class Census {
+ public:
+  Census(const Ports& ports, const Solid& solid) : ports_(ports), solid_(solid) {}
+
+  bool something_stored() const { return stored_ > 0; }
+  bool something_locked() const { return locked_ > 0; }
+  bool several_bodies() const { return bodies_ > 1; }  ///< with one alone, none can come near another
+
+  /// Collective.
+  void count_bodies() {
+    std::int64_t counts[2] = {static_cast<std::int64_t>(solid_.bodies().size()), static_cast<std::int64_t>(solid_.locked())};
+    ports_.ranks.sum(counts, 2);
+    bodies_ = counts[0];
+    locked_ = counts[1];
+  }
+  /// Returns how many more are stored than the time before. Collective.
+  std::int64_t count_stored() {
+    const std::int64_t before = stored_;
+    stored_ = static_cast<std::int64_t>(solid_.store().size());
+    ports_.ranks.sum(&stored_, 1);
+    return stored_ - before;
+  }
+
+ private:
+  const Ports& ports_;
+  const Solid& solid_;
+  std::int64_t stored_ = 0;  // interior granules
+  std::int64_t locked_ = 0;  // interface and interior granules
+  std::int64_t bodies_ = 0;  // parts of bodies, on all ranks
+};
+
+}  // namespace solidcull

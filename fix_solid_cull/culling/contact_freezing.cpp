@@ -1,0 +1,155 @@
+#include "contact_freezing.h"
+
+#include <algorithm>
+#include <tuple>
+
+namespace solidcull {
+
+bool ContactFreezing::is_locked(std::int64_t tag, const Changes& changes) const {
+  if (const int* i = index_.find(tag)) return shell_[*i].locked;
+  return changes.locked_anywhere.contains(tag) || (groups_.ghost(tag) && !changes.freed_anywhere.contains(tag));
+}
+
+/// In this change, and not before it in the same step.
+bool ContactFreezing::just_locked(int i) const {
+  const Locked& e = shell_[i];
+  return e.locked && e.lock_step == ports_.run.step && e.came_back != ports_.run.step;
+}
+
+/// The load of a contact that goes inside stays in the balance that the older granule was locked with (invariant I5).
+void ContactFreezing::rebase(int i, std::int64_t partner, const double* history) {
+  if (shell_[i].fresh) return;
+  if (const int* j = index_.find(partner)) shell_.rebase(i, -ports_.contacts.force_on_first(i, *j, history));
+}
+
+void ContactFreezing::freeze(const Changes& changes, const Proposal& proposal) {
+  const auto locked = [&](std::int64_t tag) { return is_locked(tag, changes); };
+  TagPairs joined;
+  for (const Join& j : changes.joins)
+    if (locked(j.a) && locked(j.b)) joined.insert(ordered(j.a, j.b));
+  // two bodies that touch stay two, and their contact the engine's, until a granule is locked that touches both, or they are
+  // joined
+  const auto freezes = [&](std::int64_t a, std::int64_t b) {
+    return locked(b) &&
+           (changes.locked_anywhere.contains(a) || changes.locked_anywhere.contains(b) || joined.count(ordered(a, b)));
+  };
+  const Atoms& atoms = ports_.atoms;
+  const FrozenContacts& frozen = solid_.contacts();
+  const HistoryRows histories = ports_.contacts.histories();
+  for (int i = 0; i < atoms.owned; ++i) {
+    if (!shell_[i].locked) continue;
+    const std::int64_t tag = atoms.tag[i];
+    histories.for_each_partner(i, [&](std::int64_t partner, const double* history) {
+      const int* j = index_.find(partner);
+      if (j && just_locked(i) && just_locked(*j)) {  // most are: seen from both sides, and without contacts until now
+        if (i < *j) solid_.freeze(tag, partner, history);
+        return;
+      }
+      if (!freezes(tag, partner)) return;
+      if (!frozen.contains(tag, partner)) solid_.freeze(tag, partner, history);
+      rebase(i, partner, history);
+    });
+  }
+  for (const Proposal::Touch& t : proposal.touches)
+    if (locked(t.a) && freezes(t.a, t.b) && !frozen.contains(t.a, t.b)) {
+      solid_.freeze_in_frame(t.a, t.b, nullptr);
+      if (frozen.width()) continue;  // touching within the gap: no force
+      if (const int* a = index_.find(t.a)) rebase(*a, t.b, nullptr);
+      if (const int* b = index_.find(t.b)) rebase(*b, t.a, nullptr);
+    }
+  for (const auto& pair : joined)
+    if (!frozen.contains(pair.first, pair.second)) solid_.freeze_in_frame(pair.first, pair.second, nullptr);
+  for (const Proposal::SideChange& c : proposal.side_changes) {
+    const int* i = index_.find(c.interface_tag);
+    if (i && shell_[*i].locked && !shell_[*i].fresh && freezes(c.interface_tag, c.other_tag)) shell_.rebase(*i, -c.force);
+  }
+}
+
+void ContactFreezing::freeze_between_merged() {
+  if (solid_.contacts().width() == 0) return;
+  groups_.share();
+  const Atoms& atoms = ports_.atoms;
+  const HistoryRows histories = ports_.contacts.histories();
+  for (int i = 0; i < atoms.owned; ++i) {
+    if (!shell_[i].locked) continue;
+    const std::int64_t tag = atoms.tag[i];
+    const int own = groups_.key_of(shell_[i].body);
+    histories.for_each_partner(i, [&](std::int64_t partner, const double* history) {
+      const int* j = index_.find(partner);
+      if (j && just_locked(i) && just_locked(*j)) return;  // freeze() has seen to it
+      const int* ghost = j ? nullptr : groups_.ghost(partner);
+      const int other = j ? (shell_[*j].locked ? groups_.key_of(shell_[*j].body) : 0) : ghost ? *ghost : 0;
+      if (other != own || solid_.contacts().contains(tag, partner)) return;
+      solid_.freeze(tag, partner, history);
+      if (!j) return;
+      if (!shell_[i].fresh) shell_.rebase(i, -ports_.contacts.force_on_first(i, *j, history));
+      if (!shell_[*j].fresh) shell_.rebase(*j, ports_.contacts.force_on_first(i, *j, history));
+    });
+  }
+}
+
+void ContactFreezing::thaw(const Changes& changes) {
+  std::vector<std::int64_t> freed;  // in the order of their tags: neighbours lie near each other in memory then
+  freed.reserve(changes.freed_anywhere.size());
+  changes.freed_anywhere.for_each([&](std::int64_t tag, char) { freed.push_back(tag); });
+  std::sort(freed.begin(), freed.end());
+  struct Given {
+    int atom;
+    std::int64_t partner;
+    std::size_t history;
+  };
+  std::vector<Given> given;
+  std::vector<double> histories;
+  const FrozenContacts& frozen = solid_.contacts();
+  const std::size_t width = frozen.width();
+  const auto give = [&](const int* atom, std::int64_t partner, const double* history) {
+    if (!atom) return static_cast<double*>(nullptr);
+    given.push_back({*atom, partner, histories.size()});
+    histories.insert(histories.end(), history, history + width);
+    return &histories[given.back().history];
+  };
+  const SolidBodies& bodies = solid_.bodies();
+  for (const std::int64_t tag : freed) {
+    const int* mine = index_.find(tag);
+    const int own = bodies.body_of(tag);
+    frozen.for_each(tag, [&](std::int64_t partner, const double* history) {
+      if (!history || (partner < tag && changes.freed_anywhere.contains(partner))) return;
+      const Eigen::Matrix3d& turn = bodies.pose(own ? own : bodies.body_of(partner)).turn();
+      if (double* const h = give(mine, partner, history)) frozen.turn(h, turn);
+      if (double* const h = give(index_.find(partner), tag, history)) {
+        frozen.turn(h, turn);
+        frozen.change_side(h);
+      }
+    });
+  }
+  std::sort(given.begin(), given.end(),
+            [](const Given& a, const Given& b) { return std::tie(a.atom, a.history) < std::tie(b.atom, b.history); });
+  std::vector<Contacts::History> of_one;
+  for (std::size_t g = 0; g < given.size();) {
+    const int atom = given[g].atom;
+    of_one.clear();
+    for (; g < given.size() && given[g].atom == atom; ++g) of_one.push_back({given[g].partner, &histories[given[g].history]});
+    ports_.contacts.give_histories(atom, of_one.data(), of_one.size());
+  }
+  thawed_ = changes.freed_anywhere;
+}
+
+void ContactFreezing::rebase_thawed() {
+  if (thawed_.empty()) return;
+  const Atoms& atoms = ports_.atoms;
+  const int owned = atoms.owned;
+  ports_.contacts.neighbours().for_each_pair(owned, [&](int i, int j, int k) {
+    const bool freed = thawed_.contains(atoms.tag[i]), other_freed = thawed_.contains(atoms.tag[j]);
+    const bool stays = shell_[i].locked && !shell_[i].fresh;
+    const bool other_stays = j < owned && shell_[j].locked && !shell_[j].fresh;
+    if (!(stays && other_freed) && !(freed && other_stays)) return;
+    const double reach = (atoms.radius[i] + atoms.radius[j]) * ports_.contacts.reach_factor;
+    if ((atoms.place(i) - atoms.place(j)).squaredNorm() > reach * reach) return;
+    const Vec3 f = ports_.contacts.force_on_first(i, k);
+    if (stays && other_freed) shell_.rebase(i, f);
+    if (freed && other_stays) shell_.rebase(j, -f);
+  });
+  thawed_.clear();
+}
+
+}  // namespace solidcull

@@ -1,0 +1,59 @@
+// A contact between two granules of one body waits, frozen; it comes back when one of them is free (invariants I3, I5).
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "atom_index.h"
+#include "body_groups.h"
+#include "flat_map.h"
+#include "ports.h"
+#include "proposal.h"
+#include "shell.h"
+#include "solid.h"
+
+namespace solidcull {
+
+/// Who changes in one reneighbouring: tags on this rank in the order of the changes, and on this rank or near it.
+struct Changes {
+  std::vector<std::int64_t> freed, locked;
+  FlatMap<char> freed_anywhere, locked_anywhere;
+  std::vector<Join> joins;
+};
+
+/// Local, but for freeze_between_merged().
+class ContactFreezing {
+ public:
+  ContactFreezing(const Ports& ports, Solid& solid, Shell& shell, const AtomIndex& index, BodyGroups& groups)
+      : ports_(ports), solid_(solid), shell_(shell), index_(index), groups_(groups) {}
+
+  /// Contacts of what is to be freed go back to the engine. Whatever they are given to must be an atom by now.
+  void thaw(const Changes& changes);
+  /// Contacts of what has just been locked with its neighbours in a body, before bodies are made.
+  void freeze(const Changes& changes, const Proposal& proposal);
+  /// Two bodies that touched have become one: what the engine saw between them goes inside too. Collective.
+  void freeze_between_merged();
+  /// At the first forces after thaw(): a contact that came out of the body brings the load that it had inside, no change for the
+  /// granule that stays.
+  void rebase_thawed();
+
+ private:
+  using TagPairs = std::set<std::pair<std::int64_t, std::int64_t>>;
+  static std::pair<std::int64_t, std::int64_t> ordered(std::int64_t a, std::int64_t b) {
+    return {std::min(a, b), std::max(a, b)};
+  }
+  bool is_locked(std::int64_t tag, const Changes& changes) const;
+  bool just_locked(int i) const;
+  void rebase(int i, std::int64_t partner, const double* history);
+
+  const Ports& ports_;
+  Solid& solid_;
+  Shell& shell_;
+  const AtomIndex& index_;
+  BodyGroups& groups_;
+  FlatMap<char> thawed_;  // granules that were freed in the last change, here or near
+};
+
+}  // namespace solidcull

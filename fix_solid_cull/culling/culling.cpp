@@ -1,0 +1,471 @@
+// The pipelines: a run's beginning, a step, a look, a membership change. Each step of them has its own class.
+#include "culling.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "body_changes.h"
+#include "input_error.h"
+
+namespace solidcull {
+namespace {
+
+// in a run that starts with an empty box, steps between two tries to find granules to take the scales from
+constexpr int first_granules_every = 50;
+// after this share of the atoms came or went, the engine sorts its arrays at once
+constexpr double sort_share = 0.05;
+
+}  // namespace
+
+void Culling::expect(std::initializer_list<Phase> phases, const char* where) const {
+  if (std::find(phases.begin(), phases.end(), phase_) != phases.end()) return;
+  static const char* names[] = {"between runs", "at the beginning of a run", "before the first step", "in a time step"};
+  throw InternalError(std::string(where) + " was called " + names[static_cast<int>(phase_)]);
+}
+
+// ------------------------------------------------------------------------------------------------------------ a run begins
+
+void Culling::begin_run() {
+  const std::vector<bool> flips = p_.ports.contacts.flips();
+  if (!p_.solid.set_histories(flips, p_.ports.contacts.vectors()))
+    throw InputError("the contact model's history has changed from " + std::to_string(p_.solid.contacts().width()) + " to " +
+                     std::to_string(flips.size()) + " numbers while granules are culled: unfix " + p_.ports.run.name +
+                     " before the pair_style changes");
+  p_.ports.ranks.update();
+  Vec3 periods = p_.ports.run.edges();
+  for (int d = 0; d < 3; ++d)
+    if (!p_.ports.run.periodic[d]) periods[d] = 0;
+  p_.solid.set_periods(periods);
+  p_.report.membership_changed();  // the deck may have made granules, or deleted some
+  phase_ = Phase::beginning;
+}
+
+void Culling::refuse_what_lies_too_far() const {
+  // twice the way to the farthest corner: places wait in the frames of bodies that may have moved through the box
+  const Vec3 corner = p_.ports.run.box.lo.cwiseAbs().cwiseMax(p_.ports.run.box.hi.cwiseAbs());
+  const double far = 2 * corner.norm(), farthest = GranuleStore::farthest * 2 * p_.scales.diameter();
+  if (far <= farthest) return;
+  char told[64];
+  std::snprintf(told, sizeof told, "%.4g m from the origin, and the box reaches %.4g m", farthest / 2, far / 2);
+  throw InputError("store compact keeps places up to " + std::string(told) +
+                   ": move the origin to the granules, or use store exact");
+}
+
+void Culling::find_scales() {
+  double diameter = p_.scales.diameter(), gravity = p_.scales.gravity();
+  if (diameter == 0) {
+    double sums[2] = {0, 0};
+    const Atoms& atoms = p_.ports.atoms;
+    for (int i = 0; i < atoms.owned; ++i)
+      if (atoms.groups[i] & atoms.own_bit) {
+        sums[0] += 2 * atoms.radius[i];
+        sums[1] += 1;
+      }
+    p_.ports.ranks.sum(sums, 2);
+    if (sums[1] > 0) diameter = sums[0] / sums[1];
+  }
+  const double g = p_.ports.run.gravity().norm();
+  if (g > 0) gravity = g;
+  if (gravity == 0) {
+    gravity = Scales::standard_gravity;
+    p_.ports.run.say("the deck has no fix gravity; 'speed' and 'tolerance' are measured with 9.81 m/s^2");
+  }
+  p_.scales.set(diameter, gravity);
+  if (diameter == 0) return;  // an empty box: the first granules set the scale
+  p_.scales.make_laws(p_.ports.run.dt);
+  if (p_.solid.has_store()) return;
+  if (p_.scales.compact()) refuse_what_lies_too_far();
+  p_.solid.open_store();
+}
+
+void Culling::set_up_atoms() {
+  expect({Phase::beginning}, "set_up_atoms");
+  find_scales();
+  if (!p_.solid.has_store()) return;
+  // a restart file keeps groups: marks of granules that this fix does not hold would hide their contacts
+  for (int i = 0; i < p_.ports.atoms.owned; ++i)
+    if (!p_.shell[i].locked) p_.ports.atoms.mark_interface(i, false);
+  if (p_.snapshot.waits()) {
+    p_.snapshot.take_up();
+    count_restored();
+  }
+  p_.closure.begin_run();
+  open_for_insertion();
+  change();
+  p_.closure.run_has_begun();
+}
+
+void Culling::is_set_up() {
+  expect({Phase::beginning}, "is_set_up");
+  // other fixes add their forces later: the loads are taken at the start of the first step
+  phase_ = Phase::ready;
+}
+
+void Culling::initial_step() {
+  // `run … pre no` goes on without a setup
+  expect({Phase::ready, Phase::stepping, Phase::between_runs}, "initial_step");
+  const bool first = phase_ == Phase::ready;
+  phase_ = Phase::stepping;
+  if (!first || !p_.solid.has_store()) return;
+  take_loads();
+  p_.gravity.begin_run();
+  see_walls(true);
+  const std::int64_t step = p_.ports.run.step;
+  if (p_.ports.ranks.any(p_.wake.any_here())) ask_for_build(step);
+  p_.pacing.begin_run(step, p_.census.something_locked());
+}
+
+// ------------------------------------------------------------------------------------------------------------ a time step
+
+void Culling::integrate() {
+  expect({Phase::stepping}, "integrate");
+  if (!p_.solid.has_store() || !p_.scales.rigid() || (p_.ports.ranks.count == 1 && p_.motion.active().empty())) return;
+  const auto timed = p_.report.time(Part::load);
+  p_.motion.kick_and_drift();
+  p_.motion.place();
+  // the engine looks at its atoms only: a body that has none would come near something unseen
+  if ((p_.ports.ranks.count == 1 || bodies_are_fast_) && p_.ports.ranks.any(p_.motion.comes_too_far(0)))
+    p_.ports.run.ask_for_reneighbouring(p_.ports.run.step);
+}
+
+void Culling::take_neighbours() {
+  p_.motion.is_stale();
+  lists_are_new();
+  if (!p_.solid.has_store()) return;
+  p_.handover.take_over();
+  if (p_.lost.forget_lost()) {
+    p_.groups.settle();
+    p_.census.count_bodies();
+    label_bodies(p_.ports.atoms, p_.shell, p_.groups);
+    p_.motion.is_stale();
+  }
+  p_.groups.share();
+  check_inserted();
+  if (Invariants::asked()) p_.invariants.check();
+}
+
+void Culling::leave_out_inner_pairs() {
+  if (!inner_pairs_listed_) return;
+  inner_pairs_listed_ = false;
+  const auto timed = p_.report.time(Part::load);
+  std::vector<int> body(static_cast<std::size_t>(p_.ports.atoms.owned + p_.ports.atoms.ghosts));
+  for (std::size_t i = 0; i < body.size(); ++i) body[i] = p_.groups.key_of_atom(static_cast<int>(i));
+  p_.ports.contacts.leave_out_pairs_within(body);
+}
+
+void Culling::take_loads() {
+  const auto timed = p_.report.time(Part::load);
+  p_.motion.refresh();
+  p_.freezing.rebase_thawed();
+  p_.motion.take_loads();
+  if (p_.scales.sleeping()) p_.grounding.press_on_walls();
+}
+
+void Culling::take_forces() {
+  expect({Phase::stepping}, "take_forces");
+  const std::int64_t step = p_.ports.run.step;
+  if (!p_.solid.has_store()) {  // the run started with an empty box: the first granules that are poured set the scales
+    if (step % first_granules_every == 0) find_scales();
+    if (!p_.solid.has_store()) return;
+    p_.pacing.begin_within_run(step);
+  }
+  take_loads();
+  collect_wakes();
+  if (p_.pacing.due(step)) {
+    look();
+    if (p_.ports.ranks.any(p_.wake.any_here())) ask_for_build(step + 1);
+  }
+  if (p_.census.something_stored()) open_for_insertion();
+}
+
+/// Gentle loads wait for each other; a blow does not.
+void Culling::collect_wakes() {
+  if (!p_.census.something_locked()) return;
+  const Ranks& ranks = p_.ports.ranks;
+  const int period = p_.pacing.wake_period();
+  const bool blow = p_.motion.largest_excess() > Pacing::blow;
+  if (!p_.pacing.wakes_now(p_.ports.run.step) && !ranks.any(blow)) return;
+  bool waking = false;
+  for (const int i : p_.motion.interface_atoms()) {
+    const double excess = p_.shell.take_excess(i);
+    if (excess <= 1) continue;
+    p_.wake.ask(p_.ports.atoms.place(i), p_.scales.wake_up().radius(excess));
+    waking = true;
+  }
+  const bool rigid = p_.scales.rigid();
+  std::int64_t asked[2] = {waking || (rigid && p_.motion.comes_too_far(period + 1)), rigid && p_.motion.is_fast(period + 1)};
+  ranks.largest(asked, 2);
+  if (asked[0]) ask_for_build(p_.ports.run.step + 1);
+  bodies_are_fast_ = asked[1] != 0;
+}
+
+void Culling::finish_step() {
+  expect({Phase::stepping}, "finish_step");
+  if (!p_.solid.has_store() || !p_.scales.rigid() || p_.motion.active().empty()) return;
+  const auto timed = p_.report.time(Part::load);
+  p_.motion.kick();
+  p_.motion.give_velocities_to_riders();
+}
+
+void Culling::write_outputs() {
+  expect({Phase::stepping}, "write_outputs");
+  if (p_.solid.has_store()) p_.files.write_due();
+}
+
+void Culling::end_run() {
+  if (p_.solid.has_store()) p_.report.tell_run();
+  if (phase_ == Phase::stepping) phase_ = Phase::between_runs;  // after `run 0` the first step is still to come, if `pre no`
+}
+
+/// The only place where the rebuilds that this fix asks for are counted.
+void Culling::ask_for_build(std::int64_t step) {
+  if (p_.ports.run.ask_for_reneighbouring(step)) p_.pacing.count_build();
+}
+
+// ------------------------------------------------------------------------------------------------------------ a look
+
+void Culling::see_walls(bool new_run) {
+  if (new_run) p_.cover.begin_run(p_.walls.a_wall_has_gone());
+  const std::vector<WallContact> contacts = p_.ports.walls.contacts();
+  if (p_.scales.needs_surface()) p_.cover.close_behind_walls(contacts, [&](int i) { return p_.survey[i].calm > 0; });
+  p_.walls.update(contacts, new_run);
+}
+
+void Culling::look() {
+  const auto timed = p_.report.time(Part::look);
+  const std::int64_t step = p_.ports.run.step;
+  const bool any_culled = p_.ports.ranks.any(!p_.motion.interface_atoms().empty() || p_.solid.store().size() > 0);
+  p_.gravity.watch();
+  std::int64_t in_bodies[2] = {0, static_cast<std::int64_t>(p_.solid.locked())};
+  for (const auto& [number, body] : p_.solid.bodies().bodies())
+    if (p_.wake.asks_body(p_.groups.key_of(number))) in_bodies[0] += body.mass.count;
+  p_.ports.ranks.sum(in_bodies, 2);
+  p_.pacing.see_waking_bodies(in_bodies[0], in_bodies[1], step);
+  if (p_.pacing.waits_for_calm(step)) p_.pacing.see_energy(p_.survey.kinetic_energy_of_exterior(), step);
+  const bool may_cull = p_.pacing.may_cull(step);
+  if (may_cull || any_culled) see_walls(false);
+  proposal_ = survey(may_cull, any_culled);
+  judge(may_cull, proposal_);
+  p_.pacing.schedule(step, p_.census.something_locked(), p_.census.something_stored());
+}
+
+/// What is to be culled; what is exposed, or stands at walls that hold it, is seen on the way.
+Proposal Culling::survey(bool may_cull, bool any_culled) {
+  const Patience patience = p_.pacing.patience(p_.census.something_locked());
+  Proposal proposal;
+  std::int64_t candidates[2] = {0, p_.ports.atoms.owned};  // of so many
+  if (may_cull)
+    candidates[0] = p_.survey.find_calm(patience, proposal);
+  else
+    p_.survey.forget_calm();
+  p_.ports.ranks.sum(candidates, 2);
+  const bool live = p_.scales.needs_surface();
+  const double few = (live ? Pacing::worth_share : Pacing::worth_watching) * static_cast<double>(candidates[1]);
+  const bool some_candidates = candidates[0] > 0 && static_cast<double>(candidates[0]) >= few;
+  if (!some_candidates && !any_culled) {
+    p_.survey.leave_out_unsteady(patience, proposal);
+  } else if (!live) {
+    p_.survey.leave_out_unsteady(patience, proposal);
+    p_.survey.choose_asleep(patience, proposal);
+    ground_and_press();
+  } else {
+    const auto timed = p_.report.time(Part::depth);
+    p_.cover.draw();
+    p_.survey.choose_deep(patience, p_.cover, proposal);
+    p_.survey.leave_out_unsteady(patience, proposal);
+    p_.cover.wake_exposed();
+  }
+  if (p_.ports.ranks.any(!proposal.chosen.empty())) p_.survey.tie(proposal);
+  return proposal;
+}
+
+void Culling::ground_and_press() {
+  if (!p_.scales.rigid()) {
+    p_.grounding.share_out_loads();
+    return;
+  }
+  p_.grounding.update(p_.meshes.wanted());
+  if (p_.ports.ranks.any(p_.motion.stale())) {
+    p_.index.index(p_.ports.atoms);  // they were sorted since membership changed
+    p_.groups.settle();
+    p_.motion.refresh_in_step();
+    p_.motion.give_velocities();
+  }
+  p_.grounding.share_out_loads();
+  const bool asked = p_.closure.ask_to_store(p_.motion.interface_atoms());
+  if (p_.ports.ranks.any(p_.grounding.lets_go() || asked)) ask_for_build(p_.ports.run.step + 1);
+}
+
+/// Is it worth a rebuild of the neighbour lists, and did culling pay since the last look?
+void Culling::judge(bool may_cull, const Proposal& proposal) {
+  const std::int64_t step = p_.ports.run.step, restored = p_.solid.ledger().granules_restored();
+  const Ranks& ranks = p_.ports.ranks;
+  std::int64_t counts[3] = {static_cast<std::int64_t>(proposal.chosen.size()), p_.survey.exterior_here(),
+                            static_cast<std::int64_t>(proposal.overdue_tags.size())};
+  ranks.sum(counts, 3);
+  const std::int64_t chosen = counts[0], exterior = counts[1], overdue = counts[2];
+  const bool many = static_cast<double>(chosen) >= Pacing::worth_share * static_cast<double>(exterior);
+  if (chosen > 0 && (many || overdue > 0)) ask_for_build(step + 1);
+  if (ranks.any(!proposal.joins.empty())) ask_for_build(step + 1);
+  const std::int64_t restored_here = restored - restored_then_;
+  restored_then_ = restored;
+  if (!p_.pacing.judges(may_cull)) {
+    p_.pacing.forget_work();
+    return;
+  }
+  std::int64_t work[4] = {static_cast<std::int64_t>(p_.motion.interface_atoms().size()),
+                          static_cast<std::int64_t>(p_.solid.store().size()), restored_here, p_.ports.atoms.owned};
+  ranks.sum(work, 4);
+  const Pacing::Verdict verdict = p_.pacing.judge({work[0], work[1], work[3], work[2], chosen, exterior}, step);
+  if (verdict.wait == 0) return;
+  p_.pacing.see_wait(verdict.wait, p_.survey.kinetic_energy_of_exterior(), step);
+  if (verdict.give_back) {
+    p_.wake.ask_all();
+    ask_for_build(step + 1);
+  }
+  if (verdict.tell)
+    p_.ports.run.say("among " + std::to_string(exterior) + " granules too few can be culled for it to pay; trying again every " +
+                     std::to_string(verdict.wait * p_.scales.look_every()) + " steps or more");
+}
+
+// ------------------------------------------------------------------------------------------------------- a membership change
+
+void Culling::change() {
+  if (!p_.solid.has_store()) return;
+  const auto timed = p_.report.time(Part::membership);
+  if (p_.ports.ranks.any(p_.ports.ranks.subdomain_changed())) {
+    p_.ports.ranks.update();
+    p_.handover.forget_homes();
+  }
+  p_.ports.memory.freed(p_.exchange.begin_change());
+  MembershipChange c(p_.for_change(), p_.wake.take(p_.ports.ranks), proposal_.take());
+  const bool changes = p_.ports.ranks.any(c.any_here() || p_.grounding.lets_go() || open_for_insertion_);
+  bool shell_changed = false;
+  p_.grounding.let_go();
+  if (changes || p_.ports.ranks.count > 1) p_.index.index(p_.ports.atoms);
+  if (changes) c.free_and_lock();
+  close_shell(changes, shell_changed);  // before contacts thaw: what they are given to must be atoms
+  if (changes) {
+    c.thaw_and_unlock();
+    c.freeze_and_lock();
+    p_.groups.settle();
+    c.finish_bodies();
+    p_.census.count_bodies();
+    if (p_.census.several_bodies()) close_shell(true, shell_changed);  // parts that came off face each other now
+  }
+  store_and_fetch(c, changes, shell_changed);
+  if (changes || p_.ports.ranks.any(shell_changed)) publish(c);
+  if (p_.handover.send_home()) count_restored();
+  p_.lost.remember();
+  open_for_insertion_ = false;
+  fit_memory();
+  p_.motion.is_stale();
+  p_.motion.refresh();
+  if (p_.scales.rigid()) p_.motion.give_velocities();
+  p_.motion.is_stale();  // what follows sorts the atoms
+}
+
+/// Invariant I1: what is near comes out of the store.
+void Culling::close_shell(bool changes, bool& shell_changed) {
+  const auto timed = p_.report.time(Part::shell);
+  if (changes || p_.census.something_stored()) p_.closure.share();
+  if (p_.census.something_stored()) shell_changed |= p_.closure.fetch_what_is_near(open_for_insertion_) > 0;
+}
+
+/// And what nothing is near goes in.
+void Culling::store_and_fetch(const MembershipChange& c, bool changes, bool& shell_changed) {
+  if (changes || (p_.scales.sleeping() && p_.census.something_locked()))
+    shell_changed |= p_.closure.store_what_is_deep(c.locked_some(), changes) > 0;
+  if (p_.scales.rigid() && p_.census.something_stored()) shell_changed |= p_.closure.fetch_from_outside() > 0;
+}
+
+/// The engine and the report learn how many granules there are where.
+void Culling::publish(const MembershipChange& c) {
+  p_.ports.atoms.publish_counts(-p_.census.count_stored());
+  if (p_.ports.ranks.any(static_cast<double>(c.moved()) > sort_share * p_.ports.atoms.owned)) p_.ports.atoms.sort_soon();
+  p_.report.membership_changed();
+  label_bodies(p_.ports.atoms, p_.shell, p_.groups);
+}
+
+/// After granules came from a file or another rank.
+void Culling::count_restored() {
+  p_.census.count_stored();
+  p_.census.count_bodies();
+  label_bodies(p_.ports.atoms, p_.shell, p_.groups);
+}
+
+void Culling::fit_memory() {
+  Memory& memory = p_.ports.memory;
+  memory.freed(p_.solid.fit());
+  if (phase_ == Phase::beginning) return;  // walls keep pointers into the arrays over the setup of a run
+  memory.fit_bins(p_.solid.store().size() > 0);
+  if (!memory.too_large()) return;
+  const std::size_t before = p_.shell.bytes() + p_.walls.rows().bytes() + p_.survey.rows().bytes() + p_.cover.rows().bytes();
+  memory.fit();
+  p_.motion.release_memory();
+  p_.cover.release_memory();
+  p_.closure.release_memory();
+  p_.groups.release_memory();
+  p_.lost.release_memory();
+  for (FollowsAtoms* f : p_.followers) f->fit(p_.ports.atoms.room);
+  p_.index.index(p_.ports.atoms);
+  memory.freed(before);
+}
+
+void Culling::restore_all() {
+  if (!p_.solid.has_store()) return;
+  p_.ports.contacts.bring_histories_up_to_date();
+  p_.ports.ranks.update();
+  p_.wake.ask_all();
+  change();
+  p_.ports.memory.give_bins_back();
+  if (p_.solid.store().size() != 0 || p_.solid.locked() != 0 || p_.solid.contacts().size() != 0)
+    throw InternalError("a restore of everything left " + std::to_string(p_.solid.store().size()) + " granules in the store");
+}
+
+// ------------------------------------------------------------------------------------------------------------ insertion
+
+/// Fixes that insert check for overlap with atoms only: where they may put granules, stored ones become atoms first.
+void Culling::open_for_insertion() {
+  if (phase_ == Phase::beginning) {
+    open_for_insertion_ = open_for_insertion_ || p_.ports.insertions.any();
+  } else if (p_.ports.insertions.any_due(p_.ports.run.step + 2)) {
+    open_for_insertion_ = true;
+    p_.ports.run.ask_for_reneighbouring(p_.ports.run.step + 1);
+  }
+}
+
+void Culling::check_inserted() {
+  if (!p_.ports.insertions.has_inserted() || !p_.census.something_stored()) return;
+  const Atoms& atoms = p_.ports.atoms;
+  std::int64_t overlapping = 0;
+  bool near = false;
+  for (int i = 0; i < atoms.owned + atoms.ghosts; ++i) {
+    if (atoms.is_interface(i)) continue;
+    const Sphere s = atoms.sphere(i);
+    p_.stored.for_each_near(s, p_.ports.run.skin, [&](const Resident& g) {
+      near = true;
+      if ((p_.solid.nearest_image(p_.solid.in_world(g), s.centre) - s.centre).norm() < g.radius + s.radius)
+        overlapping = atoms.tag[i];
+    });
+  }
+  p_.ports.ranks.largest(&overlapping, 1);
+  if (overlapping)
+    throw InputError(
+        "granule " + std::to_string(overlapping) +
+        " was inserted into the place of a culled one: give the insertion a region above the bed, or unfix solid/cull first");
+  if (p_.ports.ranks.any(near)) p_.ports.run.ask_for_reneighbouring(p_.ports.run.step + 1);
+}
+
+// ------------------------------------------------------------------------------------------------------------ state
+
+double Culling::largest_radius(int type) const {
+  const std::vector<double>& largest = p_.solid.largest_radius_by_type();
+  return type >= 0 && type < static_cast<int>(largest.size()) ? largest[static_cast<std::size_t>(type)] : 0.0;
+}
+
+double Culling::memory_bytes() const { return static_cast<double>(p_.shell.bytes() + p_.solid.memory_bytes()); }
+
+}  // namespace solidcull

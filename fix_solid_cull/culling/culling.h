@@ -1,0 +1,92 @@
+// Solid-state culling as a whole: owns its parts, and says in which order they act. Knows no engine but through the ports.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "culling_parts.h"
+#include "proposal.h"
+
+namespace solidcull {
+
+/// Called by the adapter in the engine's hooks, in the order of a time step. All are collective unless they say otherwise.
+/// InputError: the user's fault, on all ranks alike; any other exception: ours.
+class Culling {
+ public:
+  Culling(const Ports& ports, const Settings& settings, int types) : p_(ports, settings, types) {}
+  Culling(const Culling&) = delete;
+
+  // --- a run begins
+  void begin_run();     ///< contact model, walls and box are known
+  void set_up_atoms();  ///< atoms are there, neighbour lists are not
+  void is_set_up();     ///< forces are there, but for what other fixes add later. Local
+
+  // --- a time step
+  void initial_step();                                  ///< takes the loads of a run's setup
+  void integrate();                                     ///< bodies move, and carry their interface granules
+  void change();                                        ///< membership: only place where atoms come and go
+  void take_neighbours();                               ///< after the engine's exchange, when ghosts are there
+  void lists_are_new() { inner_pairs_listed_ = true; }  ///< local
+  void leave_out_inner_pairs();                         ///< local
+  void take_forces();                                   ///< after all forces: loads, wake-ups, a look
+  void finish_step();                                   ///< bodies have their velocities. Local
+  void write_outputs();
+
+  void end_run();
+  /// All granules become exterior.
+  void restore_all();
+
+  // --- state
+  double value(int n) { return p_.report.value(n); }                                        ///< f_ID[n + 1]
+  const std::map<int, InterfaceMesh>& interface_meshes() { return p_.files.ask_meshes(); }  ///< local
+  double largest_radius(int type) const;                                         ///< of what is or was stored (m). Local
+  double memory_bytes() const;                                                   ///< local
+  std::vector<double> restart_state() { return p_.snapshot.write(); }            ///< on rank 0; the first number is how many
+  void read_restart_state(const double* numbers) { p_.snapshot.read(numbers); }  ///< local
+
+  // --- what follows the engine's atoms; local
+  const std::vector<FollowsAtoms*>& followers() { return p_.followers; }
+  void arrived_from_another_rank(int i) { p_.shell.is_arriving(i); }
+  void read_from_file(int i) { p_.cover.forget(i); }
+  double* labels() { return p_.shell.labels(); }
+
+ private:
+  enum class Phase {
+    between_runs,
+    beginning,  // of a run: nothing has been computed yet
+    ready,      // set up; the first step takes the loads, in this run or, after `run 0`, in the next one
+    stepping
+  };
+  void expect(std::initializer_list<Phase> phases, const char* where) const;
+
+  void find_scales();
+  void refuse_what_lies_too_far() const;
+  void see_walls(bool new_run);
+  void take_loads();
+  void collect_wakes();
+  void look();
+  Proposal survey(bool may_cull, bool any_culled);
+  void ground_and_press();
+  void judge(bool may_cull, const Proposal& proposal);
+  void ask_for_build(std::int64_t step);
+  void open_for_insertion();
+  void check_inserted();
+  void close_shell(bool changes, bool& shell_changed);
+  void store_and_fetch(const MembershipChange& c, bool changes, bool& shell_changed);
+  void count_restored();
+  void publish(const MembershipChange& c);
+  void fit_memory();
+
+  CullingParts p_;
+  Phase phase_ = Phase::between_runs;
+  Proposal proposal_;                // of the last look, until the next change
+  bool inner_pairs_listed_ = false;  // the neighbour lists are new: pairs within bodies stand in them
+  bool open_for_insertion_ = false;  // a fix will insert: stored granules must make way in the next change
+  bool bodies_are_fast_ = false;     // some body may come too far between two times when ranks talk
+  std::int64_t restored_then_ = 0;   // granules restored on this rank until culling was judged last
+};
+
+}  // namespace solidcull

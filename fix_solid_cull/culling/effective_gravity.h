@@ -1,0 +1,45 @@
+// What a body feels as a whole: gravity less its own acceleration, in its own frame (DESIGN section 8).
+#pragma once
+
+#include "body_groups.h"
+#include "body_motion.h"
+#include "ports.h"
+#include "solid.h"
+#include "wake_requests.h"
+
+namespace solidcull {
+
+/// Asks for bodies to wake that are tilted, shaken or let fall. Local.
+class EffectiveGravity {
+ public:
+  EffectiveGravity(const Ports& ports, const Scales& scales, Solid& solid, const BodyMotion& motion, const BodyGroups& groups,
+                   WakeRequests& wake)
+      : ports_(ports), scales_(scales), solid_(solid), motion_(motion), groups_(groups), wake_(wake) {}
+
+  /// At each look.
+  void watch() {
+    watch_bodies(false);
+    gravity_then_ = ports_.run.gravity();
+  }
+  /// At the start of a run: the deck may have changed gravity, all at once.
+  void begin_run() {
+    if (ports_.run.gravity() != gravity_then_) watch_bodies(true);
+    gravity_then_ = ports_.run.gravity();
+  }
+  const Vec3& at_last_look() const { return gravity_then_; }               ///< m/s^2
+  void set_at_last_look(const Vec3& gravity) { gravity_then_ = gravity; }  ///< as a restart file has it
+
+ private:
+  void watch_bodies(bool at_once);
+  void watch(const ActiveBody& a, const Vec3& g, bool at_once);
+
+  const Ports& ports_;
+  const Scales& scales_;
+  Solid& solid_;
+  const BodyMotion& motion_;
+  const BodyGroups& groups_;
+  WakeRequests& wake_;
+  Vec3 gravity_then_ = Vec3::Zero();  // at the last look
+};
+
+}  // namespace solidcull

@@ -1,0 +1,61 @@
+// Bodies that walls hold: they stand still, so that their granules at walls may go to the store too, and hand on to the walls
+// what presses on them.
+#pragma once
+
+#include <set>
+#include <vector>
+
+#include "body_groups.h"
+#include "body_motion.h"
+#include "flat_map.h"
+#include "ports.h"
+#include "solid.h"
+#include "wall_survey.h"
+
+namespace solidcull {
+
+class Grounding : public BodyFollower {
+ public:
+  Grounding(const Ports& ports, const Scales& scales, Solid& solid, Shell& shell, const BodyGroups& groups,
+            const BodyMotion& motion, const WallSurvey& walls)
+      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), groups_(groups), motion_(motion), walls_(walls) {}
+
+  /// At each look: bodies at rest at walls that stand still are grounded; those that the walls might not hold any more wait to be
+  /// let go. `keep_frames`: bodies of one granule keep their own frame. Collective.
+  void update(bool keep_frames);
+  /// Which elements bear what presses on a body: those that bear the body. Collective; each look ends with it.
+  void share_out_loads();
+  /// Bodies that were to be let go are. When their granules at walls can come back. Local.
+  void let_go();
+  bool lets_go() const { return !to_let_go_.empty(); }
+  /// In each step: walls feel what stored granules press on them. Local.
+  void press_on_walls();
+  /// What walls do to an interface granule that nothing else touches: what meshes that report their load do to it, and the rest.
+  /// Local.
+  std::vector<WallLoad> wall_loads_on(int i) const;
+
+  void merged(int gone, int kept, bool same_frame) override;
+  void grounded_or_let_go(int body) override { forgotten(body); }
+  void forgotten(int body) override;
+
+ private:
+  struct Sum {
+    Vec3 value = Vec3::Zero();
+  };
+  std::set<int> keys_of_held_spanning_bodies() const;
+  bool may_be_let_go(int number, const SolidBody& body, bool held) const;
+  bool is_at_rest(const SolidBody& body, const ActiveBody& loads, const int* only_atom) const;
+
+  const Ports& ports_;
+  const Scales& scales_;
+  Solid& solid_;
+  Shell& shell_;
+  const BodyGroups& groups_;
+  const BodyMotion& motion_;
+  const WallSurvey& walls_;
+  FlatMap<int> looks_at_rest_;    // body -> looks in a row at which it was at rest at a wall that stands still
+  FlatMap<Sum> mean_extra_load_;  // grounded body -> running mean of what its walls bear beyond what is frozen (N)
+  std::set<int> to_let_go_;       // grounded bodies that the walls might not hold any more
+};
+
+}  // namespace solidcull

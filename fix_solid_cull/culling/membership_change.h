@@ -1,0 +1,82 @@
+// One reneighbouring: exterior <-> interface <-> interior. Lives on the stack of Culling::change().
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "atom_index.h"
+#include "body_groups.h"
+#include "body_meshes.h"
+#include "contact_freezing.h"
+#include "granule_masses.h"
+#include "ports.h"
+#include "proposal.h"
+#include "shell.h"
+#include "shell_closure.h"
+#include "solid.h"
+#include "store_exchange.h"
+#include "survey.h"
+#include "wake_requests.h"
+#include "wall_survey.h"
+
+namespace solidcull {
+
+/// Who changes between exterior and interface, step by step; the steps that concern all of the culling stand in Culling.
+class MembershipChange {
+ public:
+  struct Parts {
+    const Ports& ports;
+    const Scales& scales;
+    Solid& solid;
+    Shell& shell;
+    AtomIndex& index;
+    const GranuleMasses& masses;
+    Arrivals& arrivals;
+    const BodyGroups& groups;
+    const WallSurvey& walls;
+    Survey& survey;
+    StoredSearch& stored;
+    StoreExchange& exchange;
+    ShellClosure& closure;
+    ContactFreezing& freezing;
+    BodyMeshes& meshes;
+  };
+
+  MembershipChange(const Parts& parts, Wakes wakes, Proposal proposal);
+
+  /// Whether anything changes by wakes and proposal, on this rank. Local.
+  bool any_here() const { return !wakes_.none() || proposal_.any_here(); }
+
+  /// Granules that wake are unlocked, and come back from the store first; those that were chosen, and still may, are locked;
+  /// ranks tell each other. Collective.
+  void free_and_lock();
+  /// Contacts of what is free go back to the engine, and the granules leave their bodies, which may come apart. Local.
+  void thaw_and_unlock();
+  /// Contacts of what is locked are frozen, and bodies grow or merge. Local.
+  void freeze_and_lock();
+  /// After the bodies' motions are settled: contacts between merged bodies are frozen, histories turned, meshes follow.
+  /// Collective.
+  void finish_bodies();
+
+  bool locked_some() const { return !changes_.locked.empty(); }
+  std::size_t moved() const { return changes_.freed.size() + changes_.locked.size(); }
+
+ private:
+  void free_what_wakes();
+  void lock_what_was_chosen();
+  void tell_neighbours();
+  void lock(int i);
+  void unlock(int i);
+  bool still_rests(int i) const;
+  void leave_body(std::int64_t tag);
+  void carve_meshes();
+  void lock_into_body(std::int64_t tag);
+  void lock_into_bodies();
+
+  const Parts p_;
+  const Wakes wakes_;
+  const Proposal proposal_;
+  Changes changes_;
+};
+
+}  // namespace solidcull

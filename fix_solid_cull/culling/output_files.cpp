@@ -1,0 +1,150 @@
+#include "output_files.h"
+
+#include <algorithm>
+#include <cstring>
+#include <exception>
+#include <vector>
+
+#include "input_error.h"
+#include "mesh_files.h"
+
+namespace solidcull {
+
+std::string OutputFiles::file_of_step(const std::string& pattern) const {
+  const std::size_t star = pattern.find('*');
+  if (star == std::string::npos) return pattern;
+  return pattern.substr(0, star) + std::to_string(ports_.run.step) + pattern.substr(star + 1);
+}
+
+void OutputFiles::write_due() {
+  const auto due = [&](int every) { return every > 0 && ports_.run.step % every == 0; };
+  for (const Output& o : scales_.settings().meshes)
+    if (due(o.every)) write_meshes(file_of_step(o.file));
+  for (const Output& o : scales_.settings().beds)
+    if (due(o.every)) write_bed(file_of_step(o.file));
+}
+
+/// Rank 0 writes; if it cannot, all ranks stop.
+template <class Write>
+void OutputFiles::on_root(const char* keyword, Write write) {
+  std::string failure;
+  if (ports_.ranks.me == 0) try {
+      write();
+    } catch (const std::exception& e) {
+      failure = e.what();
+    }
+  if (ports_.ranks.any(!failure.empty()))
+    throw InputError("keyword '" + std::string(keyword) + "': " + failure + "; nothing of the run is lost but it stops here");
+}
+
+// ------------------------------------------------------------------------------------------------------------ meshes
+
+const std::map<int, InterfaceMesh>& OutputFiles::ask_meshes() {
+  const auto timed = report_.time(Part::mesh);
+  if (!meshes_.follow_bodies()) index_.index(ports_.atoms);
+  return meshes_.ask();
+}
+
+/// On rank 0 each body's mesh, by key: each rank sends its part, and the parts are united. Empty elsewhere.
+std::map<int, InterfaceMesh> OutputFiles::whole_meshes() {
+  struct Head {
+    int key;
+    std::size_t bytes;
+  };
+  std::vector<Head> heads;
+  std::vector<char> bytes;
+  for (const auto& [body, mesh] : ask_meshes()) {
+    const std::string part = mesh.to_bytes();
+    heads.push_back({groups_.key_of(body), part.size()});
+    bytes.insert(bytes.end(), part.begin(), part.end());
+  }
+  heads = ports_.ranks.gather_on_root(heads);
+  bytes = ports_.ranks.gather_on_root(bytes);
+  std::map<int, InterfaceMesh> whole;
+  if (ports_.ranks.me != 0) return whole;
+  const char* at = bytes.data();
+  for (const Head& h : heads) {
+    InterfaceMesh part = InterfaceMesh::from_bytes(std::string(at, h.bytes), scales_.voxel(), scales_.closing());
+    at += h.bytes;
+    const auto there = whole.find(h.key);
+    if (there == whole.end())
+      whole.emplace(h.key, std::move(part));
+    else
+      there->second.merge(std::move(part));
+  }
+  return whole;
+}
+
+void OutputFiles::write_meshes(const std::string& file) {
+  const std::map<int, InterfaceMesh> whole = whole_meshes();
+  const auto timed = report_.time(Part::files);
+  on_root("mesh", [&] {
+    const std::string ending = file.substr(file.size() - 4);
+    if (ending == ".vdb") {
+      std::vector<const InterfaceMesh*> grids;
+      std::vector<std::string> names;
+      for (const auto& w : whole) {
+        grids.push_back(&w.second);
+        names.push_back("body_" + std::to_string(w.first));
+      }
+      write_vdb(file, grids, names);
+      return;
+    }
+    TriangleMesh all;
+    std::vector<int> body;
+    for (const auto& w : whole) {
+      const TriangleMesh part = w.second.triangles();
+      const auto first = static_cast<std::uint32_t>(all.vertices.size());
+      all.vertices.insert(all.vertices.end(), part.vertices.begin(), part.vertices.end());
+      for (const auto& t : part.triangles) all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+      body.resize(all.triangles.size(), w.first);
+    }
+    ending == ".stl" ? write_stl(file, all) : write_vtp(file, all, body);
+  });
+}
+
+// ------------------------------------------------------------------------------------------------------------ the bed
+
+void OutputFiles::write_bed(const std::string& file) {
+  const auto timed = report_.time(Part::files);
+  struct Row {
+    Triple x, v;
+    double radius;
+    std::int64_t tag;
+    int type, state, body;
+  };
+  std::vector<Row> rows;
+  const Atoms& atoms = ports_.atoms;
+  for (int i = 0; i < atoms.owned; ++i) {
+    const Locked& e = shell_[i];
+    const GranuleState state = !e.locked      ? GranuleState::exterior
+                               : e.excess > 1 ? GranuleState::waking
+                                              : GranuleState::interface_;
+    rows.push_back({triple(atoms.place(i)), triple(atoms.velocity(i)), atoms.radius[i], atoms.tag[i], atoms.type[i],
+                    static_cast<int>(state), static_cast<int>(shell_.labels()[i])});
+  }
+  solid_.store().for_each([&](const Resident& g) {
+    const Vec3 x = solid_.in_world(g);
+    rows.push_back({triple(ports_.run.wrapped(x)), triple(solid_.bodies().body(g.body).twist.at(x)), g.radius, g.tag,
+                    solid_.store().get(g.tag).type, static_cast<int>(GranuleState::interior), groups_.key_of(g.body)});
+  });
+  rows = ports_.ranks.gather_on_root(rows);
+  on_root("bed", [&] {
+    std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.tag < b.tag; });
+    BedTable bed;
+    for (const Row& r : rows) {
+      for (int d = 0; d < 3; ++d) {
+        bed.position.push_back(static_cast<float>(r.x[d]));
+        bed.velocity.push_back(static_cast<float>(r.v[d]));
+      }
+      bed.radius.push_back(static_cast<float>(r.radius));
+      bed.tag.push_back(static_cast<int>(r.tag));
+      bed.type.push_back(r.type);
+      bed.state.push_back(r.state);
+      bed.body.push_back(r.body);
+    }
+    write_bed_vtp(file, bed);
+  });
+}
+
+}  // namespace solidcull

@@ -1,0 +1,53 @@
+// Outputs: interface meshes and the whole bed.
+#pragma once
+
+#include <string>
+
+#include "body_groups.h"
+#include "body_meshes.h"
+#include "ports.h"
+#include "report.h"
+#include "scales.h"
+#include "shell.h"
+#include "solid.h"
+
+namespace solidcull {
+
+/// Files are written whole or not at all; one that cannot be written is an InputError on all ranks.
+class OutputFiles {
+ public:
+  OutputFiles(const Ports& ports, const Scales& scales, const Solid& solid, Shell& shell, AtomIndex& index,
+              const BodyGroups& groups, BodyMeshes& meshes, Report& report)
+      : ports_(ports),
+        scales_(scales),
+        solid_(solid),
+        shell_(shell),
+        index_(index),
+        groups_(groups),
+        meshes_(meshes),
+        report_(report) {}
+
+  /// What is due at this step. Collective.
+  void write_due();
+  /// The meshes where their bodies are now; see BodyMeshes. Local.
+  const std::map<int, InterfaceMesh>& ask_meshes();
+
+ private:
+  void write_meshes(const std::string& file);
+  void write_bed(const std::string& file);
+  std::map<int, InterfaceMesh> whole_meshes();
+  std::string file_of_step(const std::string& pattern) const;
+  template <class Write>
+  void on_root(const char* keyword, Write write);
+
+  const Ports& ports_;
+  const Scales& scales_;
+  const Solid& solid_;
+  Shell& shell_;
+  AtomIndex& index_;
+  const BodyGroups& groups_;
+  BodyMeshes& meshes_;
+  Report& report_;
+};
+
+}  // namespace solidcull

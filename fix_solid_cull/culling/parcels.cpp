@@ -1,0 +1,286 @@
+#include "parcels.h"
+
+#include <algorithm>
+#include <string>
+#include <type_traits>
+
+#include "body_changes.h"
+#include "flat_map.h"
+#include "store_exchange.h"
+
+namespace solidcull {
+namespace {
+
+class Writer {
+ public:
+  void number(double x) { out_.push_back(x); }
+  void numbers(std::initializer_list<double> x) { out_.insert(out_.end(), x); }
+  void numbers(const double* x, std::size_t n) { out_.insert(out_.end(), x, x + n); }
+  void vector(const Vec3& v) { numbers(v.data(), 3); }
+  void text(const std::string& s) {
+    number(static_cast<double>(s.size()));
+    for (const char c : s) number(c);
+  }
+  /// How many things, and their numbers.
+  void part(std::size_t things, const Writer& w) {
+    number(static_cast<double>(things));
+    numbers(w.out_.data(), w.out_.size());
+  }
+  std::vector<double> take() { return std::move(out_); }
+
+ private:
+  std::vector<double> out_;
+};
+
+class Reader {
+ public:
+  Reader(const double* in, std::size_t n) : at_(in), end_(in + n) {}
+  bool more() const { return at_ < end_; }
+  double number() { return *numbers(1); }
+  std::int64_t whole() { return static_cast<std::int64_t>(number()); }
+  std::size_t count() { return static_cast<std::size_t>(number()); }
+  Vec3 vector() { return vec(numbers(3)); }
+  const double* numbers(std::size_t n) {
+    if (n > static_cast<std::size_t>(end_ - at_)) throw InternalError("granules as numbers end too early");
+    at_ += n;
+    return at_ - n;
+  }
+  std::string text() {
+    std::string s(count(), ' ');
+    for (char& c : s) c = static_cast<char>(number());
+    return s;
+  }
+
+ private:
+  const double *at_, *end_;
+};
+
+void write(Writer& w, const Pose& p) {
+  w.vector(p.origin());
+  w.numbers(p.quaternion().coeffs().data(), 4);
+}
+
+Pose read_pose(Reader& in) {
+  const Vec3 origin = in.vector();
+  const double* q = in.numbers(4);
+  return Pose(origin, Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
+}
+
+}  // namespace
+
+// ------------------------------------------------------------------------------------------------------------ to numbers
+
+std::vector<double> Parcels::pack(const std::vector<std::int64_t>& stored, const std::vector<std::int64_t>& interface_tags,
+                                  bool all) const {
+  const FrozenContacts& contacts = solid_.contacts();
+  const SolidBodies& living = solid_.bodies();
+  Writer w;
+  w.number(ports_.ranks.me);
+  write(w, cover_.observer());
+  write(w, cover_.observed_then());
+  w.number(ports_.atoms.layouts());
+  for (int l = 0; l < ports_.atoms.layouts(); ++l) w.text(ports_.atoms.layout_text(l));
+
+  std::map<int, int> index;  // body -> its place in this list
+  Writer bodies;
+  const auto index_of = [&](int body) {
+    const auto known = index.emplace(body, static_cast<int>(index.size()));
+    if (known.second) {
+      SolidBody b = living.body(body);
+      b.each_number([&](auto& x) { bodies.number(static_cast<double>(x)); });
+    }
+    return known.first->second;
+  };
+  FlatMap<char> named;
+  Writer granules;
+  std::vector<double> record;
+  for (const std::int64_t tag : stored) {
+    const StoredGranule g = solid_.store().get(tag);
+    solid_.store().record(tag, record);
+    granules.numbers({double(g.tag), g.mass, g.radius, double(g.held), double(index_of(g.body))});
+    granules.vector(g.position);
+    granules.number(static_cast<double>(record.size()));
+    granules.numbers({double(g.type), double(g.layout), double(g.lock_step), g.normal_load, double(g.walls)});
+    granules.vector(g.load_change);
+    granules.numbers(record.data(), record.size());
+    named[tag] = 1;
+  }
+  for (const std::int64_t tag : interface_tags) {
+    const int i = index_.at(tag);
+    const Locked& e = shell_[i];
+    granules.numbers({double(tag), ports_.atoms.mass[i], ports_.atoms.radius[i], double(e.held), double(index_of(e.body))});
+    granules.vector(e.place);
+    granules.number(Parcel::no_record);
+    named[tag] = 1;
+  }
+  Writer edges;
+  std::size_t count = 0;
+  const auto edge = [&](std::int64_t low, std::int64_t high, const double* history) {
+    const int body = living.body_of(low) ? living.body_of(low) : living.body_of(high);
+    edges.numbers({double(low), double(high), double(index_of(body)), double(history != nullptr)});
+    if (history) edges.numbers(history, contacts.width());
+    ++count;
+  };
+  contacts.for_each_contact([&](std::int64_t low, std::int64_t high, const double* history) {
+    if (all || named.contains(low) || named.contains(high)) edge(low, high, history);
+  });
+  std::vector<double> inner(contacts.width());
+  for (const std::int64_t tag : stored)
+    contacts.for_each_elsewhere(tag, [&](std::int64_t partner) {
+      if (partner < tag && named.contains(partner)) return;
+      const std::int64_t low = std::min(tag, partner);
+      const bool known = solid_.inner_history(*solid_.store().find(low), std::max(tag, partner), inner.data());
+      edge(low, std::max(tag, partner), known ? inner.data() : nullptr);
+    });
+  w.part(index.size(), bodies);
+  w.part(stored.size() + interface_tags.size(), granules);
+  w.part(count, edges);
+  return w.take();
+}
+
+// ------------------------------------------------------------------------------------------------------------ from numbers
+
+std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::size_t width) {
+  std::vector<Parcel> parcels;
+  Reader in(numbers, n);
+  while (in.more()) {
+    Parcel p;
+    p.rank = static_cast<int>(in.whole());
+    p.observer = read_pose(in);
+    p.observed_then = read_pose(in);
+    std::vector<int> layout;
+    for (std::size_t k = in.count(); k > 0; --k) layout.push_back(ports_.atoms.layout_from_text(in.text()));
+    p.bodies.resize(in.count());
+    for (SolidBody& body : p.bodies) body.each_number([&](auto& x) { x = static_cast<std::decay_t<decltype(x)>>(in.number()); });
+    for (std::size_t k = in.count(); k > 0; --k) {
+      Parcel::Granule g;
+      const std::int64_t tag = in.whole();
+      g.mass = in.number();
+      g.radius = in.number();
+      g.held = in.whole() != 0;
+      g.body = static_cast<int>(in.whole());
+      g.place = in.vector();
+      g.length = static_cast<int>(in.whole());
+      if (g.length != Parcel::no_record) {
+        StoredGranule& s = g.stored;
+        s.tag = tag;
+        s.mass = g.mass;
+        s.radius = g.radius;
+        s.position = g.place;
+        s.type = static_cast<int>(in.whole());
+        s.layout = layout.at(in.count());
+        s.lock_step = in.whole();
+        s.normal_load = in.number();
+        s.walls = static_cast<int>(in.whole());
+        s.held = g.held;
+        s.load_change = in.vector();
+        if (scales_.compact()) s.lock_step = std::min(s.lock_step, StoreExchange::locked_long_ago);
+        g.record = in.numbers(static_cast<std::size_t>(g.length));
+      }
+      p.granules.emplace(tag, g);
+    }
+    for (std::size_t k = in.count(); k > 0; --k) {
+      Parcel::Edge e{in.whole(), 0, 0, {}};
+      e.high = in.whole();
+      e.body = static_cast<int>(in.whole());
+      if (in.whole()) {
+        const double* h = in.numbers(width);
+        e.history.assign(h, h + width);
+      }
+      p.edges.push_back(std::move(e));
+    }
+    parcels.push_back(std::move(p));
+  }
+  return parcels;
+}
+
+bool Parcels::is_whole_rank(const Parcel& p) const {
+  std::size_t locked = 0;
+  for (int i = 0; i < ports_.atoms.owned; ++i) locked += shell_[i].locked;
+  for (const auto& [tag, g] : p.granules) {
+    if (g.record ? !ports_.ranks.owns(p.bodies.at(g.body).pose.to_world(g.place)) : !index_.contains(tag)) return false;
+    locked -= g.record == nullptr;
+  }
+  return locked == 0;
+}
+
+void Parcels::take_up_as_it_was(const Parcel& p) {
+  solid_.stands_otherwise();
+  cover_.set_observer(p.observer, p.observed_then);
+  std::vector<int> number;
+  for (const SolidBody& body : p.bodies) number.push_back(solid_.found(body));
+  for (const auto& [tag, g] : p.granules) {
+    const int body = number.at(g.body);
+    solid_.take_in(tag, body);
+    if (g.record) {
+      StoredGranule s = g.stored;
+      s.body = body;
+      solid_.add_stored(solid_.store().rounded(s), g.record, g.length);
+    } else {
+      shell_.arrives(index_.at(tag), {body, g.place});
+    }
+  }
+  for (const Parcel::Edge& e : p.edges) solid_.freeze_in_frame(e.low, e.high, e.history.empty() ? nullptr : e.history.data());
+  for (const auto& [tag, g] : p.granules)
+    if (g.record) solid_.enter_store(tag);
+  groups_.group();
+}
+
+void Parcels::take_contacts(const std::vector<Parcel>& parcels, const std::map<std::int64_t, Taken>& taken) {
+  const auto ours = [&](std::int64_t tag) { return taken.count(tag) || solid_.bodies().body_of(tag); };
+  for (const Parcel& p : parcels)
+    for (const Parcel::Edge& e : p.edges) {
+      if ((!ours(e.low) && !ours(e.high)) || solid_.contacts().contains(e.low, e.high)) continue;
+      if (e.history.empty()) {
+        solid_.freeze_in_frame(e.low, e.high, nullptr);
+        continue;
+      }
+      std::vector<double> history = e.history;
+      solid_.contacts().turn(history.data(), p.bodies.at(e.body).pose.turn());
+      solid_.freeze(e.low, e.high, history.data());
+    }
+}
+
+void Parcels::take_granule(std::int64_t tag, const Taken& t) {
+  const Parcel::Granule& g = *t.granule;
+  const SolidBody& from = t.parcel->bodies.at(g.body);
+  const Vec3 x = from.pose.to_world(g.place);
+  const SolidBodies::Place at =
+      solid_.lock(tag, {g.mass, g.radius, x, from.twist.at(x), from.twist.spin, g.held}, masses_.by_tag());
+  SolidBody& to = solid_.body(at.body);
+  to.feel_as(from);
+  const int* i = index_.find(tag);
+  if (g.record) {
+    StoredGranule s = g.stored;
+    s.position = at.position;
+    s.body = at.body;
+    s.load_change = to.pose.turned_to_frame(from.pose.turned_to_world(s.load_change));
+    solid_.add_stored(solid_.as_stored(s), g.record, g.length);
+  } else if (i && shell_[*i].body == 0) {
+    shell_.arrives(*i, at);
+  } else {
+    arrivals_[tag] = {at, g.mass, g.radius, g.held};
+  }
+}
+
+void Parcels::take_up(const std::vector<Parcel>& parcels) {
+  solid_.stands_otherwise();
+  std::map<std::int64_t, Taken> taken;  // by tag, so that bodies are founded in the same order whoever sent what
+  for (const Parcel& p : parcels)
+    for (const auto& [tag, g] : p.granules) {
+      if (g.record) solid_.know_radius(g.stored.type, g.radius);
+      const int* i = index_.find(tag);
+      const bool here = i && shell_[*i].locked && shell_[*i].body == 0;  // an interface granule of a restart file
+      if (!solid_.bodies().body_of(tag) && (here || ports_.ranks.owns(p.bodies.at(g.body).pose.to_world(g.place))))
+        taken.emplace(tag, Taken{&p, &g});
+    }
+  take_contacts(parcels, taken);
+  for (const auto& [tag, t] : taken) take_granule(tag, t);
+  adopt_places(ports_.atoms, solid_, shell_, arrivals_);
+  solid_.turn_frozen();
+  for (const auto& [tag, t] : taken)
+    if (t.granule->record) solid_.enter_store(tag);
+  groups_.settle();
+}
+
+}  // namespace solidcull

@@ -1,0 +1,314 @@
+// All that the culling asks of an engine: seven small ports (proxies). An engine implements them once; the tests have a small
+// world in memory that does (tests/unit/small_world.h). SI units; world frame.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "frozen_wall_loads.h"
+#include "internal_error.h"
+#include "sphere.h"
+
+namespace solidcull {
+
+inline Vec3 vec(const double* v) { return Vec3(v[0], v[1], v[2]); }
+inline void set(double* to, const Vec3& v) {
+  for (int d = 0; d < 3; ++d) to[d] = v[d];
+}
+
+/// A vector in a row that ranks exchange: such rows are copied byte by byte.
+using Triple = std::array<double, 3>;
+inline Triple triple(const Vec3& v) { return {v[0], v[1], v[2]}; }
+inline Vec3 vec(const Triple& t) { return vec(t.data()); }
+
+/// An axis-aligned box (m).
+struct Box {
+  Vec3 lo = Vec3::Zero(), hi = Vec3::Zero();
+};
+
+/// The granules that are atoms in the engine, as views of its arrays: the owned ones first, then ghosts. Views hold for one hook;
+/// take_out() and put_back() renew them. Local, but for publish_counts().
+class Atoms {
+ public:
+  virtual ~Atoms() = default;
+
+  int owned = 0, ghosts = 0;
+  int room = 0;  ///< owned atoms and ghosts that the arrays have room for
+  double *x = nullptr, *v = nullptr, *omega = nullptr, *f = nullptr, *torque = nullptr;  ///< rows of three
+  const double *radius = nullptr, *mass = nullptr;
+  const int *tag = nullptr, *type = nullptr;
+  int* groups = nullptr;  ///< bits of the groups that an atom is in
+  int interface_bit = 0;  ///< the group of interface granules
+  int own_bit = 0;        ///< the fix's own group
+  int movable_bits = 0;   ///< groups that an integrator moves
+  int held_bits = 0;      ///< groups that something holds or drives: never culled
+  int gravity_bits = 0;   ///< groups that gravity pulls; 0: there is no gravity
+
+  Vec3 place(int i) const { return vec(x + 3 * std::size_t(i)); }
+  Vec3 velocity(int i) const { return vec(v + 3 * std::size_t(i)); }
+  Vec3 spin(int i) const { return vec(omega + 3 * std::size_t(i)); }
+  Vec3 force(int i) const { return vec(f + 3 * std::size_t(i)); }
+  void set_place(int i, const Vec3& to) { set(x + 3 * std::size_t(i), to); }
+  void set_velocity(int i, const Vec3& to) { set(v + 3 * std::size_t(i), to); }
+  void set_spin(int i, const Vec3& to) { set(omega + 3 * std::size_t(i), to); }
+  void clear_load(int i) {
+    set(f + 3 * std::size_t(i), Vec3::Zero());
+    set(torque + 3 * std::size_t(i), Vec3::Zero());
+  }
+  Sphere sphere(int i) const { return {place(i), radius[i]}; }
+  bool is_interface(int i) const { return (groups[i] & interface_bit) != 0; }
+  void mark_interface(int i, bool on) { on ? groups[i] |= interface_bit : groups[i] &= ~interface_bit; }
+  /// An integrator moves it, gravity pulls it as it does the others, and nothing else holds or drives it.
+  bool may_be_culled(int i) const {
+    const int g = groups[i];
+    return (g & own_bit) && (g & movable_bits) && !(g & held_bits) && (!gravity_bits || (g & gravity_bits));
+  }
+
+  /// Everything that the engine keeps of owned granule i, as doubles; `layout`: the number of its columns' layout.
+  virtual void pack(int i, std::vector<double>& record, int& layout) = 0;
+  /// Which numbers of a record are position (where `positions`), velocity and spin; found by trying them on owned granule i.
+  virtual std::vector<int> motion_words(int i, bool positions) = 0;
+  /// Deletes owned granule i; the last owned granule takes its index. Only while membership changes.
+  virtual void take_out(int i) = 0;
+  /// A granule from its record; returns its index. Only while membership changes.
+  virtual int put_back(const std::vector<double>& record, int layout) = 0;
+  /// Into the periodic box; which image it is follows from the place.
+  virtual void wrap(int i) = 0;
+
+  /// Column layouts for restart files and other ranks.
+  virtual int layouts() const = 0;
+  virtual std::string layout_text(int layout) const = 0;
+  virtual int layout_from_text(const std::string& text) = 0;
+
+  /// The engine learns how many atoms there are; `returned`: that came out of the store (negative: went in), over all ranks, so
+  /// that it misses none. Collective.
+  virtual void publish_counts(std::int64_t returned) = 0;
+  virtual void sort_soon() = 0;  ///< many atoms are new: the engine should sort them
+};
+
+/// Neighbour pairs as rows: partner k of owned atom `row[r]` is partners[row[r]][k] & mask. Each pair of owned atoms stands once,
+/// a pair with a ghost on each side.
+struct NeighbourRows {
+  int rows = 0;
+  const int *row = nullptr, *count = nullptr;
+  const int* const* partners = nullptr;
+  int mask = ~0;
+
+  /// Calls visit(i, j, k) for each pair: owned atom i, its partner j, j's number in i's row.
+  template <class Visit>
+  void for_each_pair(int owned, Visit visit) const {
+    for (int r = 0; r < rows; ++r) {
+      const int i = row[r];
+      if (i >= owned) continue;
+      for (int k = 0; k < count[i]; ++k) visit(i, partners[i][k] & mask, k);
+    }
+  }
+};
+
+/// Contact histories of owned granules, each pair on both sides: tags of the partners and `width` numbers for each.
+struct HistoryRows {
+  const int* count = nullptr;
+  const int* const* partner = nullptr;
+  const double* const* history = nullptr;
+  int width = 0;
+
+  /// Calls visit(tag of the partner, history as granule i sees it); nothing where the contact model keeps no history.
+  template <class Visit>
+  void for_each_partner(int i, Visit visit) const {
+    if (!count) return;
+    for (int k = 0; k < count[i]; ++k)
+      visit(static_cast<std::int64_t>(partner[i][k]), history[i] + static_cast<std::ptrdiff_t>(width) * k);
+  }
+};
+
+/// What touches what, and how hard. Local.
+class Contacts {
+ public:
+  virtual ~Contacts() = default;
+
+  /// Two granules closer than this times the sum of their radii bear on each other (above 1 with cohesion).
+  double reach_factor = 1;
+
+  virtual NeighbourRows neighbours() const = 0;   ///< valid until the next neighbour build
+  virtual HistoryRows histories() const = 0;      ///< valid between pre_exchange and the next neighbour build
+  virtual std::vector<bool> flips() const = 0;    ///< for each history number: does it change sign with the side
+  virtual std::vector<int> vectors() const = 0;   ///< first indices of those that are vectors of space
+  virtual void bring_histories_up_to_date() = 0;  ///< outside of a time step
+
+  struct History {
+    std::int64_t partner;
+    const double* numbers;
+  };
+  /// Adds n contacts to an owned granule's list; a partner that is there already keeps what it has.
+  virtual void give_histories(int i, const History* contacts, std::size_t n) = 0;
+  virtual void clear_histories(int i) = 0;
+
+  /// Force (N) on atom i by partner k of its row.
+  virtual Vec3 force_on_first(int i, int k) = 0;
+  /// Force (N) on owned atom i by owned atom j with this history (nullptr: none).
+  virtual Vec3 force_on_first(int i, int j, const double* history) = 0;
+  /// Pairs of atoms with the same body number (0: none) are taken out of the neighbour lists.
+  virtual void leave_out_pairs_within(const std::vector<int>& body_of_atom) = 0;
+};
+
+/// An owned granule within the skin of a wall.
+struct WallContact {
+  int granule;   ///< index of the owned atom
+  Vec3 to_wall;  ///< from the granule's centre to the nearest point of the wall (m)
+  double gap;    ///< surface to wall; negative: overlap (m)
+  bool moving;   ///< the wall can move
+};
+
+struct WallTriangle {
+  int mesh, index;  ///< the engine's numbers; valid until triangles() is called again
+  Vec3 corner[3];
+  Box box;      ///< around its corners
+  bool moving;  ///< the mesh can move
+};
+
+/// Walls and meshes. Local.
+class Walls {
+ public:
+  virtual ~Walls() = default;
+  /// All owned granules near a wall. Valid while neighbour lists are.
+  virtual std::vector<WallContact> contacts() const = 0;
+  virtual std::vector<WallTriangle> triangles() const = 0;
+  /// Is a sphere that is no atom closer than `gap` to the triangle, or to any wall that is no mesh?
+  virtual bool near(const WallTriangle& t, const Sphere& s, double gap) const = 0;
+  virtual bool primitive_near(const Sphere& s, double gap) const = 0;
+  virtual std::vector<std::string> names() const = 0;  ///< sorted: to see that one has gone
+  /// What still elements of meshes that report their load did to the granule in this step.
+  virtual std::vector<WallLoad> loads_on(std::int64_t tag) = 0;
+  /// A mesh element bears this in addition (N, N m about the mesh's point of reference), in this step.
+  virtual void press(int mesh, int element, const Vec3& force, const Vec3& torque) = 0;
+};
+
+/// Places where fixes insert granules, looking at atoms only. Local.
+class Insertions {
+ public:
+  virtual ~Insertions() = default;
+  virtual bool any() const = 0;
+  virtual bool any_due(std::int64_t step) const = 0;  ///< at that step
+  /// Boxes around their regions, `margin` larger on each side; of those due at this step or the next only, if `soon`.
+  virtual std::vector<Box> boxes(bool soon, double margin) const = 0;
+  virtual bool has_inserted() const = 0;  ///< in this reneighbouring
+};
+
+/// Ranks, and periodic images, which are neighbours too. Rows are plain structs; the same type is named by all ranks.
+class Ranks {
+ public:
+  virtual ~Ranks() = default;
+
+  int me = 0, count = 1;
+
+  /// Whether it holds on any rank. Collective.
+  virtual bool any(bool here) const = 0;
+  /// Sums, or largest values, over all ranks, in place. Collective.
+  virtual void sum(double* numbers, int n) const = 0;
+  virtual void sum(std::int64_t* numbers, int n) const = 0;
+  virtual void largest(double* numbers, int n) const = 0;
+  virtual void largest(std::int64_t* numbers, int n) const = 0;
+
+  /// False where one rank owns a box without periodic sides: exchange() gives nothing then.
+  virtual bool has_neighbours() const = 0;
+  /// Subdomains may have moved: reads them anew. Collective.
+  virtual void update() = 0;
+  virtual bool subdomain_changed() const = 0;
+  /// Whether this rank's subdomain holds the place (periodic images wrapped).
+  virtual bool owns(const Vec3& place) const = 0;
+  /// Shifts by which periodic images of a place near this rank may differ, the zero shift first (m).
+  virtual const std::vector<Vec3>& image_shifts() const = 0;
+
+  /// Rows whose first member is the place `Triple at`. Each goes to every other rank and periodic image whose subdomain is within
+  /// `width` (m) of it; what comes back has its place shifted into this rank's neighbourhood. Collective.
+  template <class Row>
+  std::vector<Row> exchange(const std::vector<Row>& rows, double width) const {
+    static_assert(std::is_trivially_copyable<Row>::value && std::is_same<decltype(Row::at), Triple>::value,
+                  "a row is plain data");
+    static_assert(offsetof(Row, at) == 0, "the place comes first");
+    std::vector<Row> in;
+    exchange_bytes(rows.data(), rows.size(), sizeof(Row), width, [&](std::size_t n) {
+      in.resize(n);
+      return in.data();
+    });
+    return in;
+  }
+  /// All rows of all ranks, in rank order: on every rank, or on rank 0 only. Collective.
+  template <class Row>
+  std::vector<Row> gather(const std::vector<Row>& rows) const {
+    return gathered(rows, true);
+  }
+  template <class Row>
+  std::vector<Row> gather_on_root(const std::vector<Row>& rows) const {
+    return gathered(rows, false);
+  }
+
+ protected:
+  /// Makes room for n rows and says where they go.
+  using Room = std::function<void*(std::size_t n)>;
+  virtual void exchange_bytes(const void* rows, std::size_t n, std::size_t bytes, double width, const Room& room) const = 0;
+  virtual void gather_bytes(const void* rows, std::size_t n, std::size_t bytes, bool everywhere, const Room& room) const = 0;
+
+ private:
+  template <class Row>
+  std::vector<Row> gathered(const std::vector<Row>& rows, bool everywhere) const {
+    static_assert(std::is_trivially_copyable<Row>::value, "a row is plain data");
+    std::vector<Row> all;
+    gather_bytes(rows.data(), rows.size(), sizeof(Row), everywhere, [&](std::size_t n) {
+      all.resize(n);
+      return all.data();
+    });
+    return all;
+  }
+};
+
+/// The run: time, box, gravity. The numbers hold for one hook.
+class Run {
+ public:
+  virtual ~Run() = default;
+
+  std::int64_t step = 0;
+  double dt = 0;    ///< s
+  double skin = 0;  ///< Verlet skin (m)
+  Box box, own;     ///< the whole box, this rank's subdomain
+  std::array<bool, 3> periodic{};
+  std::string name;  ///< the fix's ID
+
+  Vec3 edges() const { return box.hi - box.lo; }
+  bool any_periodic() const { return periodic[0] || periodic[1] || periodic[2]; }
+
+  virtual Vec3 gravity() const = 0;                   ///< m/s^2, now
+  virtual Vec3 wrapped(const Vec3& place) const = 0;  ///< into the periodic box
+  /// Neighbour lists are to be built at this step, so that membership can change. True if that was not asked for already. All
+  /// ranks ask alike.
+  virtual bool ask_for_reneighbouring(std::int64_t step) = 0;
+  virtual void say(const std::string& line) const = 0;  ///< one line to screen and log, by rank 0, under the fix's name
+};
+
+/// The engine's memory, cut to what is left once most granules are stored. Local.
+class Memory {
+ public:
+  virtual ~Memory() = default;
+  virtual void freed(std::size_t bytes) = 0;    ///< so many bytes more: may give them back to the system
+  virtual bool too_large() const = 0;           ///< arrays are far larger than the atoms need
+  virtual void fit() = 0;                       ///< cuts them. While membership changes, not at the start of a run
+  virtual void fit_bins(bool some_stored) = 0;  ///< likewise: wider search bins where few atoms are left
+  virtual void give_bins_back() = 0;
+};
+
+struct Ports {
+  Atoms& atoms;
+  Contacts& contacts;
+  Walls& walls;
+  Insertions& insertions;
+  Ranks& ranks;
+  Run& run;
+  Memory& memory;
+};
+
+}  // namespace solidcull

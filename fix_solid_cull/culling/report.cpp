@@ -1,0 +1,92 @@
+#include "report.h"
+
+#include <cstdio>
+#include <string>
+
+namespace solidcull {
+
+double Report::value(int n) {
+  if (n < 0 || n >= counts + carried) return 0;
+  if (totals_step_ != ports_.run.step || totals_version_ != membership_version_) {
+    totals_.clear();
+    carried_.clear();
+  }
+  totals_step_ = ports_.run.step;
+  totals_version_ = membership_version_;
+  if (totals_.empty()) count_totals();
+  if (n < counts) return totals_[n];
+  if (carried_.empty()) sum_carried();
+  return carried_[n - counts];
+}
+
+void Report::count_totals() {
+  double bodies = 0, interface_granules = 0;
+  for (const auto& b : solid_.bodies().bodies()) bodies += groups_.has_key_of_first_part(b.first);
+  for (int i = 0; i < ports_.atoms.owned; ++i) interface_granules += shell_[i].locked;
+  const Ledger& ledger = solid_.ledger();
+  const bool open = solid_.has_store();
+  double sums[9] = {ports_.atoms.owned - interface_granules,
+                    interface_granules,
+                    open ? static_cast<double>(solid_.store().size()) : 0.0,
+                    bodies,
+                    open ? solid_.store().mass() : 0.0,
+                    static_cast<double>(ledger.granules_locked()),
+                    static_cast<double>(ledger.granules_restored()),
+                    open ? ledger.mass_error(solid_.store()) : 0.0,
+                    ledger.energy_added()};
+  ports_.ranks.sum(sums, 9);
+  double largest[2] = {motion_.largest_excess(), watch_.total()};
+  ports_.ranks.largest(largest, 2);
+  totals_ = {sums[0],    sums[1],    sums[2], sums[3], sums[4], sums[5], sums[6], static_cast<double>(ledger.carves()),
+             largest[0], largest[1], sums[7], sums[8]};
+}
+
+/// What interior granules carry, so that a deck can add it to what its atoms have: momentum, angular momentum about the origin,
+/// kinetic energy, and their centre of mass.
+void Report::sum_carried() {
+  double mass = 0, energy = 0;
+  Vec3 momentum = Vec3::Zero(), turning = Vec3::Zero(), moment = Vec3::Zero();
+  if (solid_.has_store())
+    solid_.store().for_each([&](const Resident& g) {
+      const Twist& twist = solid_.bodies().body(g.body).twist;
+      const Vec3 x = solid_.in_world(g);
+      const double m = solid_.store().get(g.tag).mass;
+      const RigidPart p = RigidPart::granule(m, g.radius, x, twist.at(x), twist.spin);
+      mass += m;
+      momentum += m * p.velocity;
+      turning += p.angular_momentum(Vec3::Zero());
+      energy += p.kinetic_energy();
+      moment += m * x;
+    });
+  carried_ = {momentum[0], momentum[1], momentum[2], turning[0], turning[1], turning[2],
+              energy,      moment[0],   moment[1],   moment[2],  mass};
+  ports_.ranks.sum(carried_.data(), static_cast<int>(carried_.size()));
+  for (int d = 7; d < 10; ++d) carried_[d] = carried_[10] > 0 ? carried_[d] / carried_[10] : 0.0;
+}
+
+void Report::tell_run() {
+  static const char* names[] = {"load", "look", "depth", "membership", "shell", "mesh", "files"};
+  constexpr int parts = static_cast<int>(Part::count);
+  double seconds[parts];
+  for (int p = 0; p < parts; ++p) seconds[p] = watch_.seconds(static_cast<Part>(p));
+  ports_.ranks.largest(seconds, parts);
+  totals_.clear();
+  value(0);
+  char text[512];
+  std::snprintf(text, sizeof text,
+                "%.0f exterior, %.0f interface, %.0f interior granules in %.0f bodies; culled %.0f, restored %.0f, "
+                "carves %.0f; mass error %.3g kg, energy added %.3g J",
+                totals_[0], totals_[1], totals_[2], totals_[3], totals_[5], totals_[6], totals_[7], totals_[10], totals_[11]);
+  ports_.run.say(text);
+  double total = 0;
+  std::string each;
+  for (int p = 0; p < parts; ++p) {
+    total += seconds[p];
+    std::snprintf(text, sizeof text, "%s%s %.3g", p ? ", " : "", names[p], seconds[p]);
+    each += text;
+  }
+  std::snprintf(text, sizeof text, "%.4g s in the fix since it was made: %s", total, each.c_str());
+  ports_.run.say(text);
+}
+
+}  // namespace solidcull

@@ -1,0 +1,49 @@
+// What the run is told: f_ID, f_ID[...], and two lines at the end of each run.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "body_groups.h"
+#include "body_motion.h"
+#include "ports.h"
+#include "shell.h"
+#include "solid.h"
+#include "stop_watch.h"
+
+namespace solidcull {
+
+class Report {
+ public:
+  static constexpr int counts = 12;   ///< f_ID[1..12]
+  static constexpr int carried = 10;  ///< after them: what interior granules carry
+  static constexpr int interior = 2;  ///< index of f_ID itself among them
+
+  Report(const Ports& ports, const Solid& solid, const Shell& shell, const BodyGroups& groups, const BodyMotion& motion)
+      : ports_(ports), solid_(solid), shell_(shell), groups_(groups), motion_(motion) {}
+
+  /// f_ID[n + 1]. Collective.
+  double value(int n);
+  /// Numbers of granules are others. Local.
+  void membership_changed() { ++membership_version_; }
+  /// At the end of a run. Collective.
+  void tell_run();
+
+  StopWatch::Running time(Part part) { return watch_.time(part); }
+
+ private:
+  void count_totals();
+  void sum_carried();
+
+  const Ports& ports_;
+  const Solid& solid_;
+  const Shell& shell_;
+  const BodyGroups& groups_;
+  const BodyMotion& motion_;
+  StopWatch watch_;
+  std::vector<double> totals_, carried_;  // as of:
+  std::int64_t totals_step_ = -1, totals_version_ = -1;
+  std::int64_t membership_version_ = 0;
+};
+
+}  // namespace solidcull

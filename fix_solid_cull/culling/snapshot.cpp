@@ -1,0 +1,93 @@
+#include "snapshot.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "input_error.h"
+
+namespace solidcull {
+namespace {
+
+constexpr double file_mark = 20261122;  // the format's version
+/// The numbers before the ranks' parcels.
+enum Header { mark, diameter, gravity, gravity_x, counters = gravity_x + 3, width = counters + 4, ranks, header_size };
+
+}  // namespace
+
+std::vector<double> Snapshot::write() {
+  std::vector<std::int64_t> stored, interface_tags;
+  std::vector<double> mine;
+  index_.index(ports_.atoms);
+  if (solid_.has_store()) {
+    solid_.store().for_each([&](const Resident& g) { stored.push_back(g.tag); });
+    std::sort(stored.begin(), stored.end());
+    for (int i = 0; i < ports_.atoms.owned; ++i)
+      if (shell_[i].locked) interface_tags.push_back(ports_.atoms.tag[i]);
+    mine = parcels_.pack(stored, interface_tags, true);
+  }
+  std::array<double, 4> sums = solid_.ledger().counters();
+  const double carves = sums[2];
+  ports_.ranks.sum(sums.data(), 4);
+  sums[2] = carves;  // every rank counts every carve
+  std::int64_t size = static_cast<std::int64_t>(mine.size());
+  ports_.ranks.sum(&size, 1);
+  size += 1 + header_size;
+  constexpr std::int64_t bytes = sizeof(double), gib = std::int64_t{1} << 30;
+  if (size * bytes > INT32_MAX)
+    throw InputError("the store needs " + std::to_string(size * bytes / gib + 1) +
+                     " GiB and LIGGGHTS's restart format holds 2 GiB for a fix: unfix " + ports_.run.name +
+                     " before write_restart");
+  std::vector<double> all = ports_.ranks.gather_on_root(mine);
+  if (ports_.ranks.me != 0) return {};
+  std::vector<double> state(1 + header_size);
+  state[0] = static_cast<double>(size);
+  double* const h = &state[1];
+  h[mark] = file_mark;
+  h[diameter] = scales_.diameter();
+  h[gravity] = scales_.gravity();
+  set(h + gravity_x, gravity_.at_last_look());
+  std::copy_n(sums.begin(), 4, h + counters);
+  h[width] = static_cast<double>(solid_.contacts().width());
+  h[ranks] = ports_.ranks.count;
+  state.reserve(static_cast<std::size_t>(size));
+  state.insert(state.end(), all.begin(), all.end());
+  return state;
+}
+
+void Snapshot::read(const double* numbers) {
+  state_.assign(numbers + 1, numbers + static_cast<std::size_t>(numbers[0]));
+  const double* const h = state_.data();
+  if (state_.size() < header_size || h[mark] != file_mark)
+    throw InputError("the restart file was written by another version of solidcull: write it again with this one");
+  scales_.set(h[diameter], h[gravity]);
+  gravity_.set_at_last_look(vec(h + gravity_x));
+  const bool first = ports_.ranks.me == 0;
+  solid_.set_counters({first ? h[counters] : 0, first ? h[counters + 1] : 0, h[counters + 2], first ? h[counters + 3] : 0});
+
+  // the neighbour cut-off is set before the store is taken up: it must know the largest stored radius
+  for (const Parcel& p : parcels_.unpack(h + header_size, state_.size() - header_size, static_cast<std::size_t>(h[width])))
+    for (const auto& g : p.granules)
+      if (g.second.record) solid_.know_radius(g.second.stored.type, g.second.radius);
+}
+
+void Snapshot::take_up() {
+  const std::vector<double> state = std::move(state_);
+  state_.clear();
+  const double* const h = state.data();
+  if (static_cast<std::size_t>(h[width]) != solid_.contacts().width())
+    throw InputError("the restart file holds contact histories of " + std::to_string(static_cast<int>(h[width])) +
+                     " numbers and this deck's contact model has " + std::to_string(solid_.contacts().width()) +
+                     ": use the contact model that the file was written with");
+  index_.index(ports_.atoms);
+  const std::vector<Parcel> parcels = parcels_.unpack(h + header_size, state.size() - header_size, solid_.contacts().width());
+  const bool same_ranks =
+      static_cast<int>(h[ranks]) == ports_.ranks.count && static_cast<int>(parcels.size()) == ports_.ranks.count;
+  if (same_ranks && !ports_.ranks.any(!parcels_.is_whole_rank(parcels[ports_.ranks.me])))
+    parcels_.take_up_as_it_was(parcels[ports_.ranks.me]);
+  else
+    parcels_.take_up(parcels);
+}
+
+}  // namespace solidcull

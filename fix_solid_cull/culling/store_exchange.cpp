@@ -1,0 +1,73 @@
+#include "store_exchange.h"
+
+namespace solidcull {
+
+std::size_t StoreExchange::begin_change() {
+  if (stored_at_ == never || stored_at_ == ports_.run.step) return 0;
+  const std::size_t before = solid_.store().memory_bytes();
+  solid_.forget_transient();
+  stored_at_ = never;
+  return before - solid_.store().memory_bytes();
+}
+
+int StoreExchange::bring_back(std::int64_t tag) {
+  std::vector<double> record;
+  const bool still_there = solid_.store().transient_known(tag);  // put away in this very step: nothing has moved
+  const StoredGranule g = solid_.bring_back(tag, record);
+  Atoms& atoms = ports_.atoms;
+  const int i = atoms.put_back(record, g.layout);
+  const std::int64_t now = ports_.run.step;
+  shell_.came_back(atoms, i, g, g.lock_step == locked_as_it_was_stored && still_there ? now : g.lock_step, now);
+  walls_.came_back(i, g.walls);
+  const SolidBody& body = solid_.bodies().body(g.body);
+  const Vec3 x = body.pose.to_world(g.position);
+  if (!still_there) {
+    const Vec3 near = scales_.compact() ? Vec3(0.5 * (ports_.run.box.lo + ports_.run.box.hi)) : atoms.place(i);
+    atoms.set_place(i, solid_.nearest_image(x, near));
+  }
+  atoms.set_velocity(i, body.twist.at(x));
+  atoms.set_spin(i, body.twist.spin);
+  cover_.came_back(i, x);
+  index_.set(tag, i);
+  return i;
+}
+
+void StoreExchange::put_away(int i) {
+  const Locked& e = shell_[i];
+  Atoms& atoms = ports_.atoms;
+  atoms.set_velocity(i, e.velocity);
+  atoms.set_spin(i, e.spin);
+  ports_.contacts.clear_histories(i);
+  if (scales_.compact()) atoms.wrap(i);  // the box and the place tell which image: no word is kept for it
+  std::vector<double> record;
+  StoredGranule g;
+  atoms.pack(i, record, g.layout);
+  g.position = e.place;
+  g.body = e.body;
+  g.radius = atoms.radius[i];
+  g.mass = atoms.mass[i];
+  g.tag = atoms.tag[i];
+  g.type = atoms.type[i];
+  g.lock_step = e.lock_step;
+  g.load_change = e.load_change;
+  g.normal_load = e.normal_load;
+  g.walls = walls_[i].touched;
+  g.held = e.held;
+  const std::int64_t now = ports_.run.step;
+  if (scales_.compact()) {
+    g = solid_.as_stored(g);
+    g.lock_step = e.lock_step == now ? locked_as_it_was_stored : locked_long_ago;
+  }
+  std::vector<WallLoad> loads;
+  if (walls_[i].near && scales_.sleeping()) loads = grounding_.wall_loads_on(i);
+  if (stored_at_ != now) {
+    stored_at_ = now;
+    motion_words_ = atoms.motion_words(i, !ports_.run.any_periodic() || scales_.compact());  // the place tells which image
+  }
+  solid_.put_away(g, record, motion_words_, loads);
+  index_.erase(g.tag);
+  atoms.take_out(i);
+  if (i < atoms.owned) index_.set(atoms.tag[i], i);
+}
+
+}  // namespace solidcull

@@ -1,0 +1,57 @@
+// Interface granules become interior and come back: out of the engine into the store, and the other way.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "atom_index.h"
+#include "cover.h"
+#include "grounding.h"
+#include "ports.h"
+#include "shell.h"
+#include "solid.h"
+#include "wall_survey.h"
+
+namespace solidcull {
+
+/// Only while membership changes: atoms take other indices, which the index of tags follows. Local.
+class StoreExchange {
+ public:
+  StoreExchange(const Ports& ports, const Scales& scales, Solid& solid, Shell& shell, AtomIndex& index, WallSurvey& walls,
+                Cover& cover, const Grounding& grounding)
+      : ports_(ports),
+        scales_(scales),
+        solid_(solid),
+        shell_(shell),
+        index_(index),
+        walls_(walls),
+        cover_(cover),
+        grounding_(grounding) {}
+
+  /// Interface granule i goes to the store; the last owned atom takes its index.
+  void put_away(int i);
+  /// The granule is an interface granule again, where its body is; returns its index.
+  int bring_back(std::int64_t tag);
+  /// A membership change begins: what the store keeps for the step in which granules went in is forgotten once that step is over.
+  /// Returns bytes that were freed.
+  std::size_t begin_change();
+
+  // lock_step in a compact store, which needs to know no more
+  static constexpr std::int64_t locked_long_ago = -1, locked_as_it_was_stored = -2;
+
+ private:
+  static constexpr std::int64_t never = -1;
+
+  const Ports& ports_;
+  const Scales& scales_;
+  Solid& solid_;
+  Shell& shell_;
+  AtomIndex& index_;
+  WallSurvey& walls_;
+  Cover& cover_;
+  const Grounding& grounding_;
+  std::int64_t stored_at_ = never;  // step in which granules last went into the store
+  std::vector<int> motion_words_;   // of a record: what is of no worth once that step has passed
+};
+
+}  // namespace solidcull

@@ -1,0 +1,63 @@
+// Stored granules by place in the world, wherever their bodies are, through periodic sides too.
+#pragma once
+
+#include "granule_store.h"
+#include "ports.h"
+#include "scales.h"
+#include "solid.h"
+
+namespace solidcull {
+
+/// Largest distance (m) at which two granules, atoms or stored, may be neighbours: two largest radii and the skin. Collective.
+double contact_reach(const Ports& ports, const Solid& solid);
+
+/// Local; m, world frame.
+class StoredSearch {
+ public:
+  StoredSearch(const Solid& solid, const Ranks& ranks, const Scales& scales) : solid_(solid), ranks_(ranks), scales_(scales) {}
+
+  /// Those whose surface is closer than `gap` to the sphere's, but for those of bodies for which excluded(body) holds.
+  template <class Visit, class Excluded>
+  void for_each_near(const Sphere& s, double gap, Visit visit, Excluded excluded) const {
+    solid_.store().for_each_frame([&](int frame, const Vec3&, const Vec3&) {
+      const bool shared = frame == GranuleStore::shared_frame;
+      if (!shared && excluded(frame)) return;
+      const Pose& pose = solid_.pose_of_frame(frame);
+      for (const Vec3& shift : ranks_.image_shifts())
+        solid_.store().for_each_near(frame, {pose.to_frame(s.centre + shift), s.radius}, gap, [&](const Resident& g) {
+          if (!shared || !excluded(g.body)) visit(g);
+        });
+    });
+  }
+  template <class Visit>
+  void for_each_near(const Sphere& s, double gap, Visit visit) const {
+    for_each_near(s, gap, visit, [](int) { return false; });
+  }
+
+  /// Those in the box, and some around it; of one frame, if one is given.
+  template <class Visit>
+  void for_each_in_box(const Vec3& lo, const Vec3& hi, Visit visit, int only = every_frame) const {
+    const Vec3 middle = 0.5 * (lo + hi), half = 0.5 * (hi - lo);
+    solid_.store().for_each_frame([&](int frame, const Vec3&, const Vec3&) {
+      if (only != every_frame && frame != only) return;
+      const Pose& pose = solid_.pose_of_frame(frame);
+      const Vec3 reach = turned_half_box(pose.turn().transpose(), half);
+      for (const Vec3& shift : ranks_.image_shifts()) {
+        const Vec3 at = pose.to_frame(middle + shift);
+        solid_.store().for_each_in_box(frame, at - reach, at + reach, visit);
+      }
+    });
+  }
+
+  /// How far outside its subdomain a rank may hold a stored granule.
+  double slack() const { return ranks_.count > 1 && scales_.rigid() ? scales_.diameter() : 0.0; }
+
+ private:
+  static constexpr int every_frame = -1;
+
+  const Solid& solid_;
+  const Ranks& ranks_;
+  const Scales& scales_;
+};
+
+}  // namespace solidcull

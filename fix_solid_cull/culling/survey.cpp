@@ -1,0 +1,341 @@
+#include "survey.h"
+
+#include <cmath>
+
+#include "sphere_cells.h"
+#include "stored_search.h"
+
+namespace solidcull {
+namespace {
+
+// culling waits for neighbour lists that are built anyway, until a granule has waited for so many looks
+constexpr int longest_wait = 10;
+
+MovingSphere state_of(const Atoms& atoms, int i) { return {atoms.place(i), atoms.velocity(i), atoms.spin(i), atoms.radius[i]}; }
+
+void keep_only(const FlatMap<char>& kept, std::vector<std::int64_t>& tags) {
+  tags.erase(std::remove_if(tags.begin(), tags.end(), [&](std::int64_t tag) { return !kept.contains(tag); }), tags.end());
+}
+
+FlatMap<char> set_of(const std::vector<std::int64_t>& tags) {
+  FlatMap<char> set;
+  for (const std::int64_t tag : tags) set[tag] = 1;
+  return set;
+}
+
+}  // namespace
+
+std::int64_t Survey::exterior_here() const {
+  std::int64_t n = 0;
+  for (int i = 0; i < ports_.atoms.owned; ++i) n += !shell_[i].locked;
+  return n;
+}
+
+double Survey::kinetic_energy_of_exterior() const {
+  double energy = 0;
+  for (int i = 0; i < ports_.atoms.owned; ++i)
+    if (!shell_[i].locked) energy += 0.5 * ports_.atoms.mass[i] * ports_.atoms.velocity(i).squaredNorm();
+  ports_.ranks.sum(&energy, 1);
+  return energy;
+}
+
+void Survey::forget_calm() {
+  for (int i = 0; i < ports_.atoms.owned; ++i)
+    if (!shell_[i].locked) rows_[i].calm = 0;
+}
+
+// ------------------------------------------------------------------------------------------------------------ solid state
+
+/// Of owned granules and ghosts (m/s^2).
+std::vector<Vec3> Survey::accelerations() const {
+  const Atoms& atoms = ports_.atoms;
+  std::vector<Vec3> a(static_cast<std::size_t>(atoms.owned + atoms.ghosts), Vec3::Zero());
+  for (int i = 0; i < atoms.owned; ++i)
+    if (!shell_[i].locked) a[i] = atoms.force(i) / atoms.mass[i];
+  if (scales_.rigid())
+    for (std::size_t k = 0; k < motion_.interface_atoms().size(); ++k) {
+      const ActiveBody& b = motion_.active()[motion_.slot(k)];
+      const int i = motion_.interface_atoms()[k];
+      if (!b.stands) a[i] = b.body->motion.acceleration(b.body->pose.to_world(shell_[i].place), b.force, b.torque);
+    }
+  if (!ports_.ranks.has_neighbours()) return a;
+  struct Row {
+    Triple at;
+    std::int64_t tag;
+    Triple acceleration;
+  };
+  std::vector<Row> rows;
+  for (int i = 0; i < atoms.owned; ++i) rows.push_back({triple(atoms.place(i)), atoms.tag[i], triple(a[i])});
+  rows = ports_.ranks.exchange(rows, contact_reach(ports_, solid_));
+  FlatMap<std::size_t> row_of;
+  for (std::size_t r = 0; r < rows.size(); ++r) row_of[rows[r].tag] = r;
+  for (int i = atoms.owned; i < atoms.owned + atoms.ghosts; ++i)
+    if (const std::size_t* r = row_of.find(atoms.tag[i])) a[i] = vec(rows[*r].acceleration);
+  return a;
+}
+
+/// What the neighbour lists say of each owned granule.
+struct Survey::Seen {
+  std::vector<Vec3> acceleration;  // of owned granules and ghosts (m/s^2)
+  std::vector<char> touching;      // it has a neighbour within the gap
+  std::vector<char> moving;        // it moves against one of them
+  std::vector<char> loaded;        // one of them presses on it
+  std::vector<char> drifting;      // it drifts away from one that does not
+  std::vector<Vec3> around;        // sum of mass times acceleration of what it touches (N)
+  std::vector<double> mass;        // of what it touches (kg)
+  std::vector<Pair> between_bodies;
+
+  explicit Seen(std::size_t owned)
+      : touching(owned, 0),
+        moving(owned, 0),
+        loaded(owned, 0),
+        drifting(owned, 0),
+        around(owned, Vec3::Zero()),
+        mass(owned, 0.0) {}
+};
+
+Survey::Seen Survey::see_contacts(const SolidStateLaw& law) const {
+  const Atoms& atoms = ports_.atoms;
+  const int owned = atoms.owned;
+  Seen seen(static_cast<std::size_t>(owned));
+  seen.acceleration = accelerations();
+  const double bears = ports_.contacts.reach_factor;
+  const NeighbourRows list = ports_.contacts.neighbours();
+  for (int row = 0; row < list.rows; ++row) {
+    const int i = list.row[row];
+    if (i >= owned) continue;
+    const MovingSphere a = state_of(atoms, i);
+    for (int k = 0; k < list.count[i]; ++k) {
+      const int j = list.partners[i][k] & list.mask;
+      const double reach = (a.radius + atoms.radius[j]) * (1 + SolidStateLaw::gap);
+      const double square = (atoms.place(j) - a.position).squaredNorm();
+      if (square > reach * reach) continue;
+      const MovingSphere b = state_of(atoms, j);
+      const double radii = a.radius + b.radius;
+      const bool pressed = square < radii * radii;
+      if (!pressed && square > bears * bears * radii * radii && law.spins_beside(a, b)) continue;
+      const bool drifts = !pressed && !law.still_neighbour(a, b);
+      const bool quiet = law.quiet_contact(a, b);
+      const auto note = [&](int one, int other) {
+        seen.loaded[one] |= pressed;
+        seen.drifting[one] |= drifts;
+        seen.touching[one] = 1;
+        seen.around[one] += atoms.mass[other] * seen.acceleration[other];
+        seen.mass[one] += atoms.mass[other];
+        if (!quiet) seen.moving[one] = 1;
+      };
+      note(i, j);
+      if (j < owned) note(j, i);
+      if (shell_[i].locked && groups_.key_of_atom(j)) seen.between_bodies.push_back({i, j});
+    }
+  }
+  return seen;
+}
+
+bool Survey::is_solid(int i, const Seen& seen, const SolidStateLaw& law) {
+  const Atoms& atoms = ports_.atoms;
+  const AtWall& wall = walls_[i];
+  const bool at_wall = wall.touched > 0, loaded = seen.loaded[i] || at_wall;
+  const Vec3 v = atoms.velocity(i);
+  // a granule that touches nothing but a wall that stands still is one with it where it stays: not where it rolls or slides
+  const bool leaves_wall = !seen.touching[i] && wall.stands && std::max(v.norm(), wall.slip) >= law.speed;
+  if (!(seen.touching[i] || at_wall) || seen.moving[i] || leaves_wall || !(loaded || !seen.drifting[i]) ||
+      !atoms.may_be_culled(i))
+    return false;
+  if (!scales_.rigid()) return law.at_rest(v, atoms.spin(i), atoms.radius[i]) && law.balanced(seen.acceleration[i], Vec3::Zero());
+  // a wall is a neighbour too; that it is accelerated itself is not known here
+  const double all = seen.mass[i] + (at_wall ? atoms.mass[i] : 0.0);
+  const Vec3 frame = seen.around[i] / all;
+  if (!law.balanced(seen.acceleration[i], frame)) return false;
+  AtRest& r = rows_[i];
+  const double passed = static_cast<double>(ports_.run.step - r.since) * ports_.run.dt;
+  if (r.calm == 0 || !law.went_on(v - r.velocity, r.acceleration_around, frame, passed)) {
+    r.calm = 0;  // calm begins here, with this motion
+    r.velocity = v;
+    r.acceleration_around = frame;
+    r.since = ports_.run.step;
+  }
+  return true;
+}
+
+std::int64_t Survey::find_calm(const Patience& patience, Proposal& proposal) {
+  SolidStateLaw law = scales_.solid_state();
+  law.speed /= patience.speed_divisor;
+  const Seen seen = see_contacts(law);
+  std::int64_t candidates = 0;
+  for (int i = 0; i < ports_.atoms.owned; ++i) {
+    if (shell_[i].locked) continue;
+    const bool solid = is_solid(i, seen, law);
+    rows_[i].calm = solid ? rows_[i].calm + 1 : 0;
+    candidates += rows_[i].calm >= patience.looks;
+  }
+  join_bodies(seen, patience.looks, proposal);
+  return candidates;
+}
+
+/// Bodies that have rested against each other for so many looks are one.
+void Survey::join_bodies(const Seen& seen, int looks, Proposal& proposal) {
+  const Atoms& atoms = ports_.atoms;
+  const int owned = atoms.owned;
+  for (const Pair& p : seen.between_bodies)
+    for (const int end : {p.i, p.j})
+      if (end < owned) rows_[end].calm = seen.moving[end] ? 0 : rows_[end].calm + 1;
+  for (const Pair& p : seen.between_bodies) {
+    const bool long_enough = rows_[p.i].calm >= looks && (p.j >= owned || rows_[p.j].calm >= looks);
+    if (!long_enough || seen.moving[p.i] || (p.j < owned && seen.moving[p.j])) continue;
+    proposal.joins.push_back({triple(atoms.place(p.i)), atoms.tag[p.i], atoms.tag[p.j]});
+  }
+}
+
+// ------------------------------------------------------------------------------------------------------------ steady loads
+
+/// Whether the loads on these owned granules are what they were at the last look.
+std::vector<char> Survey::find_steady(const std::vector<char>& asked) {
+  const Atoms& atoms = ports_.atoms;
+  const std::size_t owned = static_cast<std::size_t>(atoms.owned);
+  std::vector<double> normal(owned, 0.0);
+  std::vector<Vec3> pair_sum(owned, Vec3::Zero());
+  if (std::find(asked.begin(), asked.end(), 1) != asked.end())
+    ports_.contacts.neighbours().for_each_pair(atoms.owned, [&](int i, int j, int k) {
+      const bool second = j < atoms.owned;
+      if (!asked[i] && !(second && asked[j])) return;
+      const Vec3 apart = atoms.place(i) - atoms.place(j);
+      if (apart.norm() > (atoms.radius[i] + atoms.radius[j]) * ports_.contacts.reach_factor) return;
+      const Vec3 f = ports_.contacts.force_on_first(i, k);
+      const double n = std::abs(f.dot(apart)) / apart.norm();
+      normal[i] += n;
+      pair_sum[i] += f;
+      if (!second) return;
+      normal[j] += n;
+      pair_sum[j] -= f;
+    });
+  std::vector<char> steady(owned, 0);
+  const Vec3 g = ports_.run.gravity();
+  for (int i = 0; i < atoms.owned; ++i) {
+    if (shell_[i].locked) continue;
+    AtRest& r = rows_[i];
+    if (!asked[i]) {
+      r.normal_load = Locked::not_known;
+      continue;
+    }
+    // what neither pairs nor weight explain is the walls'
+    const Vec3 wall = atoms.force(i) - pair_sum[i] - atoms.mass[i] * g;
+    const double load = normal[i] + (walls_[i].touched > 0 ? wall.norm() : 0.0), then = r.normal_load;
+    const double change = scales_.solid_state().force * atoms.mass[i] * scales_.gravity() +
+                          SolidStateLaw::out_of_balance_share * scales_.settings().tolerance_relative * load;
+    steady[i] = then != Locked::not_known && std::abs(load - then) <= change;
+    r.normal_load = load;
+  }
+  return steady;
+}
+
+void Survey::leave_out_unsteady(const Patience& patience, Proposal& proposal) {
+  const int from = std::max(1, patience.looks - 1);
+  const bool live = scales_.needs_surface();
+  const Atoms& atoms = ports_.atoms;
+  FlatMap<char> chosen = set_of(proposal.chosen);
+  std::vector<char> asked(static_cast<std::size_t>(atoms.owned), 0);
+  for (int i = 0; i < atoms.owned; ++i) {
+    const int calm = shell_[i].locked ? 0 : rows_[i].calm;
+    asked[i] = live ? calm == from || chosen.contains(atoms.tag[i]) : calm >= from;
+  }
+  const std::vector<char> steady = find_steady(asked);
+  for (int i = 0; i < atoms.owned; ++i) {
+    if (!asked[i] || steady[i]) continue;
+    if (live)
+      chosen.erase(atoms.tag[i]);
+    else
+      rows_[i].calm = std::min(rows_[i].calm, patience.looks - 1);
+  }
+  keep_only(chosen, proposal.chosen);
+}
+
+// ------------------------------------------------------------------------------------------------------------ choice
+
+void Survey::choose(int i, Proposal& proposal) {
+  proposal.chosen.push_back(ports_.atoms.tag[i]);
+  if (++rows_[i].waited >= longest_wait) proposal.overdue_tags.push_back(ports_.atoms.tag[i]);
+}
+
+void Survey::choose_deep(const Patience& patience, Cover& cover, Proposal& proposal) {
+  for (int i = 0; i < ports_.atoms.owned; ++i) {
+    if (shell_[i].locked || rows_[i].calm < patience.looks) continue;
+    if (cover.is_deep(i))
+      choose(i, proposal);
+    else
+      rows_[i].waited = 0;
+  }
+}
+
+/// Calm for as many looks as what presses on it asks for.
+bool Survey::calm_enough(int i, const Patience& patience) const {
+  const double factor =
+      patience.quick ? 1 : SolidStateLaw::patience(ports_.atoms.mass[i] * scales_.gravity(), rows_[i].normal_load);
+  return rows_[i].calm >= factor * patience.looks;
+}
+
+void Survey::choose_asleep(const Patience& patience, Proposal& proposal) {
+  const Atoms& atoms = ports_.atoms;
+  SphereCells awake;
+  const double cover = scales_.depth();
+  if (cover > 0) {
+    std::vector<Sphere> spheres;
+    struct Row {
+      Triple at;
+      double radius;
+    };
+    std::vector<Row> rows;
+    for (int i = 0; i < atoms.owned; ++i) {
+      if (shell_[i].locked || calm_enough(i, patience)) continue;
+      spheres.push_back(atoms.sphere(i));
+      rows.push_back({triple(atoms.place(i)), atoms.radius[i]});
+    }
+    if (ports_.ranks.has_neighbours())
+      for (const Row& r : ports_.ranks.exchange(rows, cover + contact_reach(ports_, solid_)))
+        spheres.push_back({vec(r.at), r.radius});
+    awake.build(std::move(spheres), std::max(cover, 2 * scales_.diameter()));
+  }
+  for (int i = 0; i < atoms.owned; ++i) {
+    if (shell_[i].locked) continue;
+    if (calm_enough(i, patience) && !(cover > 0 && awake.any_near(atoms.sphere(i), cover)))
+      choose(i, proposal);
+    else
+      rows_[i].waited = 0;
+  }
+}
+
+void Survey::tie(Proposal& proposal) {
+  const Atoms& atoms = ports_.atoms;
+  const int owned = atoms.owned;
+  FlatMap<char> chosen = set_of(proposal.chosen);
+  const auto will_be_locked = [&](int i) { return atoms.is_interface(i) || i >= owned || chosen.contains(atoms.tag[i]); };
+  std::vector<char> touching(static_cast<std::size_t>(owned), 0), goes_along(static_cast<std::size_t>(owned), 0);
+  ports_.contacts.neighbours().for_each_pair(owned, [&](int i, int j, int k) {
+    const double radii = atoms.radius[i] + atoms.radius[j];
+    const double distance = (atoms.place(i) - atoms.place(j)).norm();
+    if (distance > radii * (1 + SolidStateLaw::gap)) return;
+    const bool first = will_be_locked(i), second = will_be_locked(j);
+    const bool bears = distance <= radii * ports_.contacts.reach_factor;
+    if (!bears && scales_.solid_state().spins_beside(state_of(atoms, i), state_of(atoms, j))) return;
+    if (first && second) proposal.touches.push_back({atoms.tag[i], atoms.tag[j]});
+    touching[i] = 1;
+    goes_along[i] |= second;
+    if (j < owned) {
+      touching[j] = 1;
+      goes_along[j] |= first;
+    }
+    // between owned granules the force is taken in the very state that is frozen; across ranks it is taken now
+    const bool side_change = first && second && j >= owned && shell_[i].locked && !atoms.is_interface(j);
+    if (side_change && bears) proposal.side_changes.push_back({atoms.tag[i], atoms.tag[j], ports_.contacts.force_on_first(i, k)});
+  });
+  // alone among neighbours that all stay exterior it would make no solid: nothing is saved until one of them comes along
+  for (int i = 0; i < owned; ++i) {
+    if (!touching[i] || goes_along[i] || !chosen.contains(atoms.tag[i])) continue;
+    chosen.erase(atoms.tag[i]);
+    rows_[i].waited = 0;
+  }
+  keep_only(chosen, proposal.chosen);
+  keep_only(chosen, proposal.overdue_tags);
+}
+
+}  // namespace solidcull

@@ -1,0 +1,106 @@
+// Which exterior granules are in solid state (DESIGN section 5), and which of them are to be culled.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "body_groups.h"
+#include "body_motion.h"
+#include "cover.h"
+#include "flat_map.h"
+#include "pacing.h"
+#include "per_granule.h"
+#include "ports.h"
+#include "proposal.h"
+#include "shell.h"
+#include "wall_survey.h"
+
+namespace solidcull {
+
+/// What the looks remember of a granule.
+struct AtRest {
+  int calm = 0;                  ///< looks in a row in solid state; of an interface granule: at rest against another body
+  int waited = 0;                ///< looks since it could have been culled
+  std::int64_t since = -1;       ///< step in which calm began
+  Vec3 velocity = Vec3::Zero();  ///< then (m/s)
+  Vec3 acceleration_around = Vec3::Zero();  ///< of what it touched then (m/s^2)
+  double normal_load = Locked::not_known;   ///< sum of normal contact forces at the last look (N)
+
+  static constexpr int packed_size = 10;
+  void pack(double* to) const {
+    const double values[packed_size] = {
+        double(calm),           double(waited),         double(since),          velocity[0], velocity[1], velocity[2],
+        acceleration_around[0], acceleration_around[1], acceleration_around[2], normal_load};
+    std::copy_n(values, packed_size, to);
+  }
+  static AtRest unpack(const double* v) {
+    AtRest r;
+    r.calm = static_cast<int>(v[0]);
+    r.waited = static_cast<int>(v[1]);
+    r.since = static_cast<std::int64_t>(v[2]);
+    r.velocity = vec(v + 3);
+    r.acceleration_around = vec(v + 6);
+    r.normal_load = v[9];
+    return r;
+  }
+};
+
+class Survey {
+ public:
+  Survey(const Ports& ports, const Scales& scales, const Solid& solid, const Shell& shell, const BodyMotion& motion,
+         const BodyGroups& groups, const WallSurvey& walls)
+      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), motion_(motion), groups_(groups), walls_(walls) {}
+
+  const AtRest& operator[](int i) const { return rows_[i]; }
+  PerGranule<AtRest>& rows() { return rows_; }
+  /// It was locked, or unlocked.
+  void begin_anew(int i) {
+    rows_[i].calm = rows_[i].waited = 0;
+    rows_[i].normal_load = Locked::not_known;
+  }
+
+  // --- a look, in this order
+  /// Counts looks in solid state, and finds bodies that rest against each other. Returns how many exterior granules of this rank
+  /// have been in solid state for long enough. Collective.
+  std::int64_t find_calm(const Patience& patience, Proposal& proposal);
+  /// Instead of it, where culling waits: nobody is calm. Local.
+  void forget_calm();
+  /// Granules whose load still changes from look to look are no solid state, however slowly they move; nor are they chosen. One
+  /// look before they could go, so that none is lost. Local.
+  void leave_out_unsteady(const Patience& patience, Proposal& proposal);
+  /// `exterior sleep`: whoever is in solid state is chosen, but for a cover around what is not. Collective.
+  void choose_asleep(const Patience& patience, Proposal& proposal);
+  /// `exterior live`: whoever is in solid state and deep below the surface. Local.
+  void choose_deep(const Patience& patience, Cover& cover, Proposal& proposal);
+  /// What ties the chosen to their neighbours; who would make no solid is left out. Local.
+  void tie(Proposal& proposal);
+
+  /// Kinetic energy of what is exterior (J). Collective.
+  double kinetic_energy_of_exterior() const;
+  std::int64_t exterior_here() const;
+
+ private:
+  struct Pair {
+    int i, j;
+  };
+  struct Seen;
+  std::vector<Vec3> accelerations() const;
+  Seen see_contacts(const SolidStateLaw& law) const;
+  bool is_solid(int i, const Seen& seen, const SolidStateLaw& law);
+  void join_bodies(const Seen& seen, int looks, Proposal& proposal);
+  std::vector<char> find_steady(const std::vector<char>& asked);
+  bool calm_enough(int i, const Patience& patience) const;
+  void choose(int i, Proposal& proposal);
+
+  const Ports& ports_;
+  const Scales& scales_;
+  const Solid& solid_;
+  const Shell& shell_;
+  const BodyMotion& motion_;
+  const BodyGroups& groups_;
+  const WallSurvey& walls_;
+  PerGranule<AtRest> rows_;
+};
+
+}  // namespace solidcull

@@ -1,0 +1,69 @@
+// What each owned granule knows of walls, found at the looks.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "per_granule.h"
+#include "ports.h"
+#include "shell.h"
+#include "wake_requests.h"
+
+namespace solidcull {
+
+struct AtWall {
+  int touched = 0;          ///< walls and triangles touched
+  bool moves = false;       ///< one of them can move
+  bool stands = false;      ///< one of them stands still
+  bool near = true;         ///< within the skin of a wall; true until a look has seen that it is not
+  bool moving_near = true;  ///< of one that can move; likewise
+  double slip = 0;          ///< largest velocity of the granule's surface at one of them (m/s)
+
+  static constexpr int packed_size = 5;
+  void pack(double* to) const {
+    const double values[packed_size] = {double(touched), double(moves), double(stands), double(near), double(moving_near)};
+    std::copy_n(values, packed_size, to);
+  }
+  static AtWall unpack(const double* v) {
+    AtWall w;
+    w.touched = static_cast<int>(v[0]);
+    w.moves = v[1] != 0;
+    w.stands = v[2] != 0;
+    w.near = v[3] != 0;
+    w.moving_near = v[4] != 0;
+    return w;
+  }
+};
+
+/// Local.
+class WallSurvey {
+ public:
+  explicit WallSurvey(const Ports& ports, const Shell& shell, WakeRequests& wake) : ports_(ports), shell_(shell), wake_(wake) {}
+
+  const AtWall& operator[](int i) const { return rows_[i]; }
+  PerGranule<AtWall>& rows() { return rows_; }
+  /// It has come out of the store, where this much was known.
+  void came_back(int i, int walls_touched) {
+    rows_.reset(i);
+    rows_[i].touched = walls_touched;
+  }
+
+  /// At a look. Interface granules wake whose wall has gone: at the start of a run any, within a run one that can move.
+  void update(const std::vector<WallContact>& contacts, bool new_run);
+  /// At the start of a run: whether a wall of the run before is not there any more.
+  bool a_wall_has_gone();
+
+ private:
+  // a granule still stands at a wall that is this share of its radius away, or nearer
+  static constexpr double still_there = 0.01;
+
+  const Ports& ports_;
+  const Shell& shell_;
+  WakeRequests& wake_;
+  PerGranule<AtWall> rows_;
+  std::vector<std::string> names_then_;
+};
+
+}  // namespace solidcull

@@ -1,0 +1,50 @@
+// The keywords of `fix solid/cull` (DESIGN section 11).
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace solidcull {
+
+enum class Exterior { live, sleep };
+enum class Motion { rigid, fixed };
+enum class WallCover { closed, surface };
+enum class Store { exact, compact };
+enum class Restore { exact };
+
+/// A file every so many steps; a '*' in its name becomes the step.
+struct Output {
+  int every;
+  std::string file;
+};
+
+struct Settings {
+  int every = 0;       ///< steps between looks; 0: from the deck's own scales, see look_interval()
+  double depth = 2.0;  ///< cover, in mean granule diameters: below the outer surface (live), around what moves (sleep)
+  Exterior exterior = Exterior::live;
+  double speed = 0.01;            ///< solid-state tolerance, fraction of sqrt(g d)
+  int calm = 4;                   ///< looks in a row
+  double tolerance_absolute = 3;  ///< A of the wake-up law, in granule weights
+  double tolerance_relative = 0;  ///< R of the wake-up law, in normal loads at locking
+  double carve_radius = 2.0;      ///< r0, in mean diameters
+  double carve_cap = 4.0;         ///< largest growth of r0
+  Motion motion = Motion::rigid;
+  WallCover walls = WallCover::closed;
+  Store store = Store::exact;
+  Restore restore = Restore::exact;
+  double voxel = 0.5;          ///< in mean diameters
+  std::vector<Output> meshes;  ///< interface meshes; the keyword may stand more than once
+  std::vector<Output> beds;    ///< the whole bed; likewise
+};
+
+/// Parses `keyword value ...`. Throws InputError that names keyword and value as typed, and what to do.
+Settings parse_settings(const std::vector<std::string>& words);
+
+/// The keywords that parse_settings knows, for the test that holds the command page and the code together.
+std::vector<std::string> setting_keywords();
+
+/// Steps between looks when the deck names none: a twentieth of sqrt(d/g), in which a granule that starts to fall reaches the
+/// default speed tolerance two and a half times over; at least 10, at most 1000. d in m, g in m/s^2, dt in s.
+int look_interval(double mean_diameter, double gravity, double dt);
+
+}  // namespace solidcull

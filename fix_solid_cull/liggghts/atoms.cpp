@@ -1,0 +1,88 @@
+#include "atoms.h"
+
+#include <mpi.h>
+
+#include <cstdio>
+
+#include "atom.h"
+#include "domain.h"
+#include "engine_access.h"
+#include "group.h"
+#include "output.h"
+#include "update.h"
+
+namespace solidcull {
+
+EngineAtoms::EngineAtoms(LAMMPS_NS::LAMMPS* lmp, const LAMMPS_NS::Fix* own) : Pointers(lmp), own_(own), records_(lmp, own) {}
+
+void EngineAtoms::renew() {
+  owned = atom->nlocal;
+  ghosts = atom->nghost;
+  room = atom->nmax;
+  const auto rows = [](double** a) { return a ? a[0] : nullptr; };
+  x = rows(atom->x);
+  v = rows(atom->v);
+  omega = rows(atom->omega);
+  f = rows(atom->f);
+  torque = rows(atom->torque);
+  radius = atom->radius;
+  mass = atom->rmass;
+  tag = atom->tag;
+  type = atom->type;
+  groups = atom->mask;
+  own_bit = own_->groupbit;
+}
+
+bool EngineAtoms::make_interface_group() {
+  const std::string name = std::string(own_->id) + "_interface";
+  int number = group->find(name.c_str());
+  if (number < 0) {
+    if (group->ngroup >= 32) return false;
+    std::vector<std::string> words = {name, "subtract", "all", "all"};
+    std::vector<char*> args;
+    for (std::string& w : words) args.push_back(&w[0]);
+    group->assign(static_cast<int>(args.size()), args.data());
+    number = group->find(name.c_str());
+  }
+  interface_bit = group->bitmask[number];
+  return true;
+}
+
+/// Before the first atom comes or goes: the map is cleared by the tags of the atoms that are there.
+void EngineAtoms::clear_map() {
+  if (!atom->map_style || map_cleared_) return;
+  atom->map_clear();
+  map_cleared_ = true;
+}
+
+void EngineAtoms::take_out(int i) {
+  clear_map();
+  records_.remove(i);
+  renew();
+}
+
+int EngineAtoms::put_back(const std::vector<double>& record, int layout) {
+  clear_map();
+  const int i = records_.append(record, layout);
+  renew();
+  return i;
+}
+
+void EngineAtoms::wrap(int i) { domain->remap(atom->x[i], atom->image[i]); }
+
+void EngineAtoms::publish_counts(std::int64_t returned) {
+  LAMMPS_NS::bigint here = atom->nlocal;
+  MPI_Allreduce(&here, &atom->natoms, 1, MPI_LMP_BIGINT, MPI_SUM, world);
+  if (output->thermo) engine::expect_atoms(*output->thermo, static_cast<long>(returned));
+  if (!map_cleared_) return;
+  atom->nghost = 0;
+  atom->map_set();
+  map_cleared_ = false;
+  renew();
+}
+
+void EngineAtoms::sort_soon() {
+  if (atom->sortfreq > 0) atom->nextsort = update->ntimestep;
+}
+
+}  // namespace solidcull

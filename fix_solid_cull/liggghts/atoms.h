@@ -1,0 +1,44 @@
+// LIGGGHTS's atoms as the culling sees them.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "fix.h"
+#include "granule_records.h"
+#include "pointers.h"
+#include "ports.h"
+
+namespace solidcull {
+
+class EngineAtoms : public Atoms, protected LAMMPS_NS::Pointers {
+ public:
+  /// own: the culling's fix, whose group and per-atom arrays are its own matter.
+  EngineAtoms(LAMMPS_NS::LAMMPS* lmp, const LAMMPS_NS::Fix* own);
+
+  /// The engine's arrays may be others: reads them anew. At each hook. Local.
+  void renew();
+  /// Makes the group of interface granules, unless it is there. False if all groups are taken.
+  bool make_interface_group();
+
+  void pack(int i, std::vector<double>& record, int& layout) override { records_.pack(i, record, layout); }
+  std::vector<int> motion_words(int i, bool positions) override { return records_.motion_words(i, positions); }
+  void take_out(int i) override;
+  int put_back(const std::vector<double>& record, int layout) override;
+  void wrap(int i) override;
+  int layouts() const override { return records_.layouts(); }
+  std::string layout_text(int layout) const override { return records_.layout_text(layout); }
+  int layout_from_text(const std::string& text) override { return records_.layout_from_text(text); }
+  void publish_counts(std::int64_t returned) override;
+  void sort_soon() override;
+
+ private:
+  void clear_map();
+
+  const LAMMPS_NS::Fix* own_;
+  GranuleRecords records_;
+  bool map_cleared_ = false;
+};
+
+}  // namespace solidcull

@@ -1,0 +1,28 @@
+// Which decks the culling can run with: what is refused, and which groups stay exterior.
+#pragma once
+
+#include <string>
+
+#include "atoms.h"
+#include "pointers.h"
+#include "ports.h"
+
+namespace solidcull {
+
+class DeckRules : protected LAMMPS_NS::Pointers {
+ public:
+  DeckRules(LAMMPS_NS::LAMMPS* lmp, const LAMMPS_NS::Fix* own) : Pointers(lmp), own_(own) {}
+
+  /// When the fix is made; when a run begins. InputError says what to do. Local, alike on all ranks.
+  void refuse_what_was_set_up_wrongly() const;
+  void refuse_what_cannot_be_culled() const;
+  /// Which groups of the deck may be culled: bits of `atoms`. Says where a group stays exterior for its fix.
+  void find_movable(EngineAtoms& atoms, const Run& run) const;
+
+ private:
+  void refuse_physics_that_would_miss_granules() const;
+
+  const LAMMPS_NS::Fix* own_;
+};
+
+}  // namespace solidcull

@@ -1,0 +1,162 @@
+// A pointer to a private member may be named in an explicit template instantiation ([temp.explicit]): legal C++, and checked by
+// the compiler against the engine's own headers, so a LIGGGHTS that names these members otherwise does not compile.
+#include "engine_access.h"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+
+#include "atom.h"
+#include "fix.h"
+#include "fix_contact_history.h"
+#include "fix_insert.h"
+#include "fix_insert_pack.h"
+#include "memory.h"
+#include "modify.h"
+#include "neigh_list.h"
+#include "neighbor.h"
+#include "thermo.h"
+
+namespace solidcull::engine {
+
+template <class Tag, typename Tag::type Member>
+struct Expose {
+  friend typename Tag::type member(Tag) { return Member; }
+};
+
+#define SOLIDCULL_EXPOSE(NAME, CLASS, TYPE, MEMBER) \
+  struct NAME {                                     \
+    using type = TYPE LAMMPS_NS::CLASS::*;          \
+    friend type member(NAME);                       \
+  };                                                \
+  template struct Expose<NAME, &LAMMPS_NS::CLASS::MEMBER>;
+
+using FixStyles = std::map<std::string, FixCreator>;
+SOLIDCULL_EXPOSE(ModifyFixMap, Modify, FixStyles*, fix_map)
+SOLIDCULL_EXPOSE(HistoryNewton, FixContactHistory, int*, newtonflag_)
+SOLIDCULL_EXPOSE(HistoryNames, FixContactHistory, char**, history_id_)
+SOLIDCULL_EXPOSE(HistoryCounts, FixContactHistory, int*, npartner_)
+SOLIDCULL_EXPOSE(HistoryPartners, FixContactHistory, int**, partner_)
+SOLIDCULL_EXPOSE(HistoryNumbers, FixContactHistory, double**, contacthistory_)
+SOLIDCULL_EXPOSE(InsertCompress, FixInsert, bool, compress_flag)
+SOLIDCULL_EXPOSE(PackRegion, FixInsertPack, LAMMPS_NS::Region*, ins_region)
+SOLIDCULL_EXPOSE(ThermoAtoms, Thermo, LAMMPS_NS::bigint, last_natoms)
+SOLIDCULL_EXPOSE(HistoryIntPages, FixContactHistory, LAMMPS_NS::MyPage<int>*, ipage_)
+SOLIDCULL_EXPOSE(HistoryPages, FixContactHistory, LAMMPS_NS::MyPage<double>*, dpage_)
+SOLIDCULL_EXPOSE(ListAtoms, NeighList, int, maxatoms)
+SOLIDCULL_EXPOSE(NeighborAtoms, Neighbor, int, maxatom)
+SOLIDCULL_EXPOSE(HeldPlaces, Neighbor, double**, xhold)
+SOLIDCULL_EXPOSE(HeldRadii, Neighbor, double*, rhold)
+SOLIDCULL_EXPOSE(HeldAtoms, Neighbor, int, maxhold)
+SOLIDCULL_EXPOSE(NeighborBins, Neighbor, int, mbins)
+SOLIDCULL_EXPOSE(NeighborBinHeads, Neighbor, int*, binhead)
+SOLIDCULL_EXPOSE(NeighborMostBins, Neighbor, int, maxhead)
+SOLIDCULL_EXPOSE(NeighborBinsOwn, Neighbor, int, binsizeflag)
+SOLIDCULL_EXPOSE(NeighborBinEdge, Neighbor, double, binsize_user)
+SOLIDCULL_EXPOSE(NeighborNext, Neighbor, int*, bins)
+SOLIDCULL_EXPOSE(NeighborMostNext, Neighbor, int, maxbin)
+using Procedure = void();
+SOLIDCULL_EXPOSE(SortBinHeads, Atom, int*, binhead)
+SOLIDCULL_EXPOSE(SortMostBins, Atom, int, maxbin)
+SOLIDCULL_EXPOSE(SortBinEdge, Atom, double, userbinsize)
+SOLIDCULL_EXPOSE(SortSetup, Atom, Procedure, setup_sort_bins)
+SOLIDCULL_EXPOSE(SortNext, Atom, int*, next)
+SOLIDCULL_EXPOSE(SortPermutation, Atom, int*, permute)
+SOLIDCULL_EXPOSE(SortMostAtoms, Atom, int, maxnext)
+SOLIDCULL_EXPOSE(SameTagAtoms, Atom, int, smax)
+#undef SOLIDCULL_EXPOSE
+
+std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify) { return *(modify.*member(ModifyFixMap())); }
+
+const int* history_newton_flags(const LAMMPS_NS::FixContactHistory& fix) { return fix.*member(HistoryNewton()); }
+
+const char* history_name(const LAMMPS_NS::FixContactHistory& fix, int number) { return (fix.*member(HistoryNames()))[number]; }
+
+const int* history_counts(const LAMMPS_NS::FixContactHistory& fix) { return fix.*member(HistoryCounts()); }
+
+const int* const* history_partners(const LAMMPS_NS::FixContactHistory& fix) { return fix.*member(HistoryPartners()); }
+
+const double* const* history_numbers(const LAMMPS_NS::FixContactHistory& fix) { return fix.*member(HistoryNumbers()); }
+
+bool compresses_tags(const LAMMPS_NS::FixInsert& fix) { return fix.*member(InsertCompress()); }
+
+void expect_atoms(LAMMPS_NS::Thermo& thermo, long change) { thermo.*member(ThermoAtoms()) += change; }
+
+const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::Fix* fix) {
+  const auto* pack = dynamic_cast<const LAMMPS_NS::FixInsertPack*>(fix);
+  return pack ? pack->*member(PackRegion()) : nullptr;
+}
+
+void renew_pages(LAMMPS_NS::FixContactHistory& fix, int one_atom, int page) {
+  (fix.*member(HistoryIntPages()))->init(one_atom, page);
+  (fix.*member(HistoryPages()))->init(one_atom * std::max(1, fix.get_dnum()), page);
+}
+
+void shrink_lists(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Memory& memory, int atoms) {
+  for (int l = 0; l < neighbor.nlist; ++l) {
+    LAMMPS_NS::NeighList* list = neighbor.lists[l];
+    if (!list || !list->growflag) continue;
+    if (list->ipage) list->ipage->init(list->oneatom, list->pgsize);
+    if (list->dpage) list->dpage->init(list->dnum * list->oneatom, list->dnum * list->pgsize);
+    list->inum = 0;
+    list->*member(ListAtoms()) = 0;
+    list->grow(atoms);
+  }
+  neighbor.*member(NeighborAtoms()) = atoms;
+  // where atoms were at the last build; the next build makes it anew
+  double**& places = neighbor.*member(HeldPlaces());
+  double*& radii = neighbor.*member(HeldRadii());
+  if (places) memory.destroy(places);
+  if (radii) memory.destroy(radii);
+  places = nullptr;
+  radii = nullptr;
+  neighbor.*member(HeldAtoms()) = 0;
+}
+
+void shrink_work_arrays(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_NS::Memory& memory) {
+  const auto renew = [&](int*& array, int& size, const char* name) {
+    if (!array || size <= atom.nmax) return;
+    memory.destroy(array);
+    memory.create(array, atom.nmax, name);
+    size = atom.nmax;
+  };
+  renew(neighbor.*member(NeighborNext()), neighbor.*member(NeighborMostNext()), "bins");
+  renew(atom.sametag, atom.*member(SameTagAtoms()), "atom:sametag");
+  // the engine makes these two when it sorts next
+  memory.destroy(atom.*member(SortNext()));
+  memory.destroy(atom.*member(SortPermutation()));
+  atom.*member(SortNext()) = atom.*member(SortPermutation()) = nullptr;
+  atom.*member(SortMostAtoms()) = 0;
+}
+
+int neighbor_bins(const LAMMPS_NS::Neighbor& neighbor) { return neighbor.*member(NeighborBins()); }
+
+BinEdges bin_edges(const LAMMPS_NS::Neighbor& neighbor, const LAMMPS_NS::Atom& atom) {
+  return {neighbor.*member(NeighborBinsOwn()) ? neighbor.*member(NeighborBinEdge()) : 0.0, atom.*member(SortBinEdge())};
+}
+
+void set_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_NS::Memory& memory, const BinEdges& edges) {
+  neighbor.*member(NeighborBinsOwn()) = edges.neighbor > 0;
+  neighbor.*member(NeighborBinEdge()) = edges.neighbor;
+  atom.*member(SortBinEdge()) = edges.sort;
+  const auto drop = [&](int*& heads, int& size) {
+    memory.destroy(heads);
+    heads = nullptr;
+    size = 0;
+  };
+  drop(neighbor.*member(NeighborBinHeads()), neighbor.*member(NeighborMostBins()));
+  neighbor.setup_bins();
+  if (atom.sortfreq == 0) return;
+  drop(atom.*member(SortBinHeads()), atom.*member(SortMostBins()));
+  (atom.*member(SortSetup()))();
+}
+
+void* next_symbol(const char* mangled) {
+  if (void* const found = dlsym(RTLD_NEXT, mangled)) return found;
+  std::fprintf(stderr, "ERROR: solidcull: this LIGGGHTS has no '%s': use LIGGGHTS-PUBLIC 3.8.0 as Debian builds it\n", mangled);
+  std::abort();
+}
+
+}  // namespace solidcull::engine

@@ -1,0 +1,70 @@
+// Members of LIGGGHTS 3.8 that have no accessor, reached in this one place.
+#pragma once
+
+#include <map>
+#include <string>
+
+namespace LAMMPS_NS {
+class Atom;
+class Fix;
+class FixContactHistory;
+class FixInsert;
+class LAMMPS;
+class Memory;
+class Modify;
+class Neighbor;
+class Region;
+class Thermo;
+}  // namespace LAMMPS_NS
+
+namespace solidcull::engine {
+
+using FixCreator = LAMMPS_NS::Fix* (*)(LAMMPS_NS::LAMMPS*, int, char**);
+
+/// The engine's own function behind one that this library interposes, by its mangled name; ends the program with one line where
+/// there is none.
+void* next_symbol(const char* mangled);
+template <class Function>
+Function own(const char* mangled) {
+  return reinterpret_cast<Function>(next_symbol(mangled));
+}
+
+/// The engine's table of fix styles.
+std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify);
+
+/// Per history number: 1 if it changes sign with the side it is seen from.
+const int* history_newton_flags(const LAMMPS_NS::FixContactHistory& fix);
+
+/// The engine's name for a history number.
+const char* history_name(const LAMMPS_NS::FixContactHistory& fix, int number);
+
+/// Rows of the partner lists: how many, their tags, their histories one after the other.
+const int* history_counts(const LAMMPS_NS::FixContactHistory& fix);
+const int* const* history_partners(const LAMMPS_NS::FixContactHistory& fix);
+const double* const* history_numbers(const LAMMPS_NS::FixContactHistory& fix);
+
+/// Whether the fix renumbers all granules when it inserts (compress_tags).
+bool compresses_tags(const LAMMPS_NS::FixInsert& fix);
+/// Thermo output stops the run when it counts fewer atoms than the time before ("Lost atoms"): tells it of atoms that went into
+/// the store (negative) or came back, so that truly lost ones are still found.
+void expect_atoms(LAMMPS_NS::Thermo& thermo, long change);
+/// Empties the pages that hold contact histories, for so many contacts of one atom and in a page.
+void renew_pages(LAMMPS_NS::FixContactHistory& fix, int one_atom, int page);
+/// Empties all neighbour lists and cuts their arrays to so many atoms.
+void shrink_lists(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Memory& memory, int atoms);
+/// Arrays of one number per atom that serve sorting, binning and the atom map, cut to Atom::nmax. Not between the engine's sort
+/// and its neighbour build.
+void shrink_work_arrays(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_NS::Memory& memory);
+/// Edges of the bins in which atoms are listed to find neighbours, and sorted (m); 0: the engine's choice.
+struct BinEdges {
+  double neighbor, sort;
+};
+BinEdges bin_edges(const LAMMPS_NS::Neighbor& neighbor, const LAMMPS_NS::Atom& atom);
+/// Makes the bins anew; none smaller than they have to be. Likewise.
+void set_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_NS::Memory& memory, const BinEdges& edges);
+/// How many bins the neighbour build has on this rank.
+int neighbor_bins(const LAMMPS_NS::Neighbor& neighbor);
+/// The region that an insert/pack or insert/rate fix fills.
+const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::Fix* fix);
+
+}  // namespace solidcull::engine

@@ -1,0 +1,281 @@
+#include "fix_solid_cull.h"
+
+#include <algorithm>
+#include <exception>
+#include <thread>
+#include <vector>
+
+#include "atom.h"
+#include "comm.h"
+#include "error.h"
+#include "input_error.h"
+#include "settings.h"
+#include "update.h"
+
+namespace solidcull {
+
+FixSolidCull::FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
+    : Fix(lmp, narg, arg),
+      atoms_(lmp, this),
+      contacts_(lmp),
+      walls_(lmp),
+      insertions_(lmp),
+      ranks_(lmp),
+      run_(lmp, this),
+      memory_(lmp, atoms_, contacts_),
+      rules_(lmp, this) {
+  try {
+    const Settings settings = parse_settings(std::vector<std::string>(arg + 3, arg + narg));
+    rules_.refuse_what_was_set_up_wrongly();
+    if (!atoms_.make_interface_group())
+      throw InputError("all 32 groups are taken and interface granules need one: delete a group");
+    culling_ =
+        std::make_unique<Culling>(Ports{atoms_, contacts_, walls_, insertions_, ranks_, run_, memory_}, settings, atom->ntypes);
+  } catch (const InputError& e) {
+    refuse(e.what());
+  }
+  publish_flags();
+  grow_arrays(atom->nmax);
+  for (int i = 0; i < atom->nmax; ++i) set_arrays(i);
+  atom->add_callback(0);
+  atom->add_callback(1);
+  set_geometry_threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / comm->nprocs));
+}
+
+FixSolidCull::~FixSolidCull() {
+  atom->delete_callback(id, 0);
+  atom->delete_callback(id, 1);
+}
+
+/// What LIGGGHTS is to know of this fix.
+void FixSolidCull::publish_flags() {
+  scalar_flag = 1;
+  vector_flag = 1;
+  size_vector = Report::counts + Report::carried;
+  global_freq = 1;
+  extscalar = 1;
+  extvector = 0;
+  peratom_flag = 1;
+  size_peratom_cols = 0;
+  peratom_freq = 1;
+  force_reneighbor = 1;
+  next_reneighbor = -1;
+  nevery = 1;
+  restart_global = 1;
+  restart_peratom = 1;
+  create_attribute = 1;
+}
+
+int FixSolidCull::setmask() {
+  using namespace LAMMPS_NS::FixConst;
+  return PRE_INITIAL_INTEGRATE | POST_INTEGRATE | PRE_EXCHANGE | PRE_NEIGHBOR | PRE_FORCE | PRE_FINAL_INTEGRATE |
+         FINAL_INTEGRATE | END_OF_STEP;
+}
+
+void FixSolidCull::refuse(const std::string& why) {
+  const std::string line = "fix " + std::string(id) + " solid/cull: " + why;
+  error->all(__FILE__, __LINE__, line.c_str());
+}
+
+void FixSolidCull::broken(const std::string& what) {
+  const std::string line = "fix " + std::string(id) + " solid/cull: internal error on rank " + std::to_string(comm->me) +
+                           " at step " + std::to_string(update->ntimestep) + ": " + what + "; please report it with the deck";
+  std::fprintf(stderr, "ERROR: %s\n", line.c_str());  // MPI_Abort drops what is buffered
+  std::fflush(nullptr);
+  error->one(__FILE__, __LINE__, line.c_str());
+}
+
+void FixSolidCull::renew() {
+  atoms_.renew();
+  contacts_.renew();
+  run_.renew();
+}
+
+template <class Work>
+auto FixSolidCull::hand_on(Work work) -> decltype(work()) {
+  try {
+    renew();
+    return work();
+  } catch (const InputError& e) {
+    refuse(e.what());
+  } catch (const std::exception& e) {
+    broken(e.what());
+  }
+  std::abort();  // both end the program
+}
+
+// ------------------------------------------------------------------------------------------------------------ a run begins
+
+void FixSolidCull::init() {
+  hand_on([&] {
+    rules_.refuse_what_cannot_be_culled();
+    contacts_.connect();
+    walls_.connect();
+    rules_.find_movable(atoms_, run_);
+    culling_->begin_run();
+  });
+}
+
+void FixSolidCull::setup_pre_exchange() {
+  hand_on([&] { culling_->set_up_atoms(); });
+}
+
+void FixSolidCull::setup_pre_force(int vflag) {
+  culling_->lists_are_new();
+  pre_force(vflag);
+}
+
+void FixSolidCull::setup(int) {
+  hand_on([&] { culling_->is_set_up(); });
+}
+
+// ------------------------------------------------------------------------------------------------------------ a time step
+
+void FixSolidCull::pre_initial_integrate() {
+  hand_on([&] { culling_->initial_step(); });
+}
+
+void FixSolidCull::post_integrate() {
+  hand_on([&] { culling_->integrate(); });
+}
+
+void FixSolidCull::pre_exchange() {
+  hand_on([&] { culling_->change(); });
+  vector_atom = culling_->labels();  // arrays may have been cut
+}
+
+void FixSolidCull::pre_neighbor() {
+  hand_on([&] { culling_->take_neighbours(); });
+}
+
+void FixSolidCull::pre_force(int) {
+  walls_.begin_step();
+  hand_on([&] { culling_->leave_out_inner_pairs(); });
+}
+
+void FixSolidCull::pre_final_integrate() {
+  hand_on([&] { culling_->take_forces(); });
+}
+
+void FixSolidCull::final_integrate() {
+  hand_on([&] { culling_->finish_step(); });
+}
+
+void FixSolidCull::end_of_step() {
+  hand_on([&] { culling_->write_outputs(); });
+}
+
+void FixSolidCull::post_run() {
+  hand_on([&] { culling_->end_run(); });
+}
+
+void FixSolidCull::pre_delete(bool unfix) {
+  if (unfix) hand_on([&] { culling_->restore_all(); });
+}
+
+// ------------------------------------------------------------------------------------------------------------ state
+
+double FixSolidCull::compute_scalar() { return compute_vector(Report::interior); }
+
+double FixSolidCull::compute_vector(int n) {
+  return hand_on([&] { return culling_->value(n); });
+}
+
+double FixSolidCull::memory_usage() { return culling_->memory_bytes(); }
+
+const std::map<int, InterfaceMesh>& FixSolidCull::interface_meshes() {
+  using Meshes = std::map<int, InterfaceMesh>;
+  return *hand_on([&]() -> const Meshes* { return &culling_->interface_meshes(); });
+}
+
+// the engine makes the tables of its contact models for the types that it sees among its atoms and that fixes name: a run may
+// start with all granules of a type in the store
+int FixSolidCull::min_type() {
+  for (int type = 1; type <= atom->ntypes; ++type)
+    if (culling_->largest_radius(type) > 0) return type;
+  return 0;
+}
+
+int FixSolidCull::max_type() {
+  for (int type = atom->ntypes; type > 0; --type)
+    if (culling_->largest_radius(type) > 0) return type;
+  return 0;
+}
+
+// ------------------------------------------------------------------------------------------------------------ per atom
+
+void FixSolidCull::grow_arrays(int nmax) {
+  for (FollowsAtoms* f : culling_->followers()) f->grow(nmax);
+  vector_atom = culling_->labels();
+}
+
+void FixSolidCull::copy_arrays(int from, int to, int) {
+  for (FollowsAtoms* f : culling_->followers()) f->copy(from, to);
+}
+
+void FixSolidCull::set_arrays(int i) {
+  for (FollowsAtoms* f : culling_->followers()) f->reset(i);
+}
+
+int FixSolidCull::pack_exchange(int i, double* buffer) {
+  int n = 0;
+  for (const FollowsAtoms* f : culling_->followers()) {
+    f->pack(i, buffer + n);
+    n += f->packed_size();
+  }
+  return n;
+}
+
+int FixSolidCull::unpack_exchange(int i, double* buffer) {
+  int n = 0;
+  for (FollowsAtoms* f : culling_->followers()) {
+    f->unpack(i, buffer + n);
+    n += f->packed_size();
+  }
+  culling_->arrived_from_another_rank(i);
+  return n;
+}
+
+// ------------------------------------------------------------------------------------------------------------ restart
+
+int FixSolidCull::maxsize_restart() {
+  int n = 1;
+  for (const FollowsAtoms* f : culling_->followers()) n += f->packed_size();
+  return n;
+}
+
+int FixSolidCull::pack_restart(int i, double* buffer) {
+  buffer[0] = 1 + pack_exchange(i, buffer + 1);
+  return static_cast<int>(buffer[0]);
+}
+
+void FixSolidCull::unpack_restart(int i, int nth) {
+  double* const extra = atom->extra[i];
+  int at = 0;
+  for (int k = 0; k < nth; ++k) at += static_cast<int>(extra[at]);
+  ++at;
+  for (FollowsAtoms* f : culling_->followers()) {
+    f->unpack(i, extra + at);
+    at += f->packed_size();
+  }
+  culling_->read_from_file(i);
+}
+
+void FixSolidCull::write_restart(FILE* file) {
+  const std::vector<double> state = hand_on([&] { return culling_->restart_state(); });
+  if (comm->me != 0) return;
+  const int bytes = static_cast<int>(state.size() * sizeof(double));
+  std::fwrite(&bytes, sizeof(int), 1, file);
+  std::fwrite(state.data(), sizeof(double), state.size(), file);
+}
+
+void FixSolidCull::restart(char* buffer) {
+  // the engine's buffer need not be aligned for doubles
+  double numbers = 0;
+  std::copy_n(buffer, sizeof numbers, reinterpret_cast<char*>(&numbers));
+  std::vector<double> state(static_cast<std::size_t>(numbers));
+  std::copy_n(buffer, state.size() * sizeof(double), reinterpret_cast<char*>(state.data()));
+  hand_on([&] { culling_->read_restart_state(state.data()); });
+}
+
+}  // namespace solidcull

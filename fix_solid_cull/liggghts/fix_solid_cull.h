@@ -1,0 +1,86 @@
+// fix ID group-ID solid/cull [keyword value ...]: LIGGGHTS's hooks, handed on to the culling.
+#pragma once
+
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "atoms.h"
+#include "contacts.h"
+#include "culling.h"
+#include "deck_rules.h"
+#include "engine_memory.h"
+#include "fix.h"
+#include "insertions.h"
+#include "interface_mesh_source.h"
+#include "ranks.h"
+#include "run.h"
+#include "walls.h"
+
+namespace solidcull {
+
+class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
+ public:
+  FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg);
+  ~FixSolidCull() override;
+
+  int setmask() override;
+  void pre_delete(bool unfix) override;
+  void init() override;
+  void setup_pre_exchange() override;
+  void setup_pre_neighbor() override { pre_neighbor(); }
+  void setup_pre_force(int) override;
+  void setup(int) override;
+  void pre_initial_integrate() override;
+  void post_integrate() override;
+  void pre_exchange() override;
+  void pre_neighbor() override;
+  void pre_force(int) override;
+  void pre_final_integrate() override;
+  void final_integrate() override;
+  void end_of_step() override;
+  void post_run() override;
+
+  double compute_scalar() override;
+  double compute_vector(int n) override;
+  double memory_usage() override;
+  double max_rad(int type) override { return culling_->largest_radius(type); }
+  int min_type() override;
+  int max_type() override;
+
+  void grow_arrays(int nmax) override;
+  void copy_arrays(int from, int to, int) override;
+  void set_arrays(int i) override;
+  int pack_exchange(int i, double* buffer) override;
+  int unpack_exchange(int i, double* buffer) override;
+  int pack_restart(int i, double* buffer) override;
+  void unpack_restart(int i, int nth) override;
+  int size_restart(int) override { return maxsize_restart(); }
+  int maxsize_restart() override;
+  void write_restart(FILE* file) override;
+  void restart(char* buffer) override;
+
+  const std::map<int, InterfaceMesh>& interface_meshes() override;
+
+ private:
+  /// The ports are renewed, then the work is done; what goes wrong ends in one line, not in a stack trace.
+  template <class Work>
+  auto hand_on(Work work) -> decltype(work());
+  void renew();
+  void refuse(const std::string& why);   // the user's fault; collective
+  void broken(const std::string& what);  // ours; local
+  void publish_flags();
+
+  EngineAtoms atoms_;
+  EngineContacts contacts_;
+  EngineWalls walls_;
+  EngineInsertions insertions_;
+  EngineRanks ranks_;
+  EngineRun run_;
+  EngineMemory memory_;
+  DeckRules rules_;
+  std::unique_ptr<Culling> culling_;
+};
+
+}  // namespace solidcull

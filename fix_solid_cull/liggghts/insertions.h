@@ -1,0 +1,21 @@
+// LIGGGHTS's fixes that insert granules.
+#pragma once
+
+#include <vector>
+
+#include "pointers.h"
+#include "ports.h"
+
+namespace solidcull {
+
+class EngineInsertions : public Insertions, protected LAMMPS_NS::Pointers {
+ public:
+  explicit EngineInsertions(LAMMPS_NS::LAMMPS* lmp) : Pointers(lmp) {}
+
+  bool any() const override;
+  bool any_due(std::int64_t step) const override;
+  std::vector<Box> boxes(bool soon, double margin) const override;
+  bool has_inserted() const override;
+};
+
+}  // namespace solidcull

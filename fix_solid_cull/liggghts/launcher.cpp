@@ -1,0 +1,42 @@
+// liggghts-solidcull: the stock LIGGGHTS with solidcull's styles. Takes every argument and signal that `liggghts` takes.
+#include <mpi.h>
+#include <signal.h>
+#include <stdlib.h>
+
+#include "input.h"
+#include "lammps.h"
+#include "signal_handling.h"
+#include "solidcull.h"
+
+namespace {
+
+void on_signal(int number, void (*handler)(int)) {
+  struct sigaction action = {};
+  action.sa_handler = handler;
+  sigaction(number, &action, nullptr);
+}
+
+/// Open MPI starts a daemon for each program that mpirun did not start, so that it could start others (MPI_Comm_spawn). LIGGGHTS
+/// never does, and on a busy machine the daemon may fail to start, and the run with it. Other MPIs do not read this, and what the
+/// user has set stays.
+void without_a_daemon() {
+  const bool by_mpirun = getenv("OMPI_COMM_WORLD_SIZE") || getenv("PMIX_RANK");
+  const int keep = 0;
+  if (!by_mpirun) setenv("OMPI_MCA_ess_singleton_isolated", "1", keep);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  on_signal(SIGINT, LAMMPS_NS::SignalHandler::int_handler);
+  on_signal(SIGTERM, LAMMPS_NS::SignalHandler::int_handler);  // mpirun turns SIGINT into SIGTERM
+  on_signal(SIGUSR1, LAMMPS_NS::SignalHandler::usr1_handler);
+  without_a_daemon();
+  MPI_Init(&argc, &argv);
+  auto* lmp = new LAMMPS_NS::LAMMPS(argc, argv, MPI_COMM_WORLD);
+  solidcull_register(lmp);
+  lmp->input->file();
+  delete lmp;
+  MPI_Finalize();
+  return 0;
+}

@@ -1,0 +1,79 @@
+// Makes the two styles known to an unmodified LIGGGHTS. Fix styles stand in a table; region styles in an if-chain, so the
+// engine's own Domain::add_region is interposed: this library comes before libliggghts.so in the search for symbols, and asks for
+// the next. So is the call by which a wall tells its mesh of a contact: loads of granules that are put away must be known.
+#include <cstring>
+#include <string>
+
+#include "domain.h"
+#include "engine_access.h"
+#include "error.h"
+#include "fix_mesh_surface.h"
+#include "fix_solid_cull.h"
+#include "lammps.h"
+#include "memory.h"
+#include "mesh_loads.h"
+#include "modify.h"
+#include "region_interface_mesh.h"
+#include "solidcull.h"
+
+namespace {
+
+LAMMPS_NS::Fix* make_fix(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg) { return new solidcull::FixSolidCull(lmp, narg, arg); }
+
+void add_interface_mesh(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg) {
+  LAMMPS_NS::Domain* domain = lmp->domain;
+  if (domain->find_region(arg[0]) >= 0) lmp->error->all(FLERR, "Reuse of region ID");
+  if (domain->nregion == domain->maxregion) {
+    domain->maxregion += 4;
+    domain->regions = static_cast<LAMMPS_NS::Region**>(lmp->memory->srealloc(
+        domain->regions, static_cast<LAMMPS_NS::bigint>(domain->maxregion) * sizeof(LAMMPS_NS::Region*), "domain:regions"));
+  }
+  LAMMPS_NS::Region* region = new solidcull::RegInterfaceMesh(lmp, narg, arg);
+  domain->regions[domain->nregion] = region;
+  region->init();
+  domain->nregion++;
+}
+
+}  // namespace
+
+namespace LAMMPS_NS {
+
+void Modify::add_fix(int narg, char** arg, char* suffix) {
+  using Original = void (*)(Modify*, int, char**, char*);
+  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Modify7add_fixEiPPcS1_");
+  solidcull::engine::fix_styles(*this)["solid/cull"] = make_fix;
+  original(this, narg, arg, suffix);
+}
+
+void Domain::add_region(int narg, char** arg) {
+  using Original = void (*)(Domain*, int, char**);
+  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Domain10add_regionEiPPc");
+  if (narg >= 2 && std::strcmp(arg[1], "interface/mesh") == 0)
+    add_interface_mesh(lmp, narg, arg);
+  else
+    original(this, narg, arg);
+}
+
+void FixMeshSurface::add_particle_contribution(int ip, double* frc, double* delta, int iTri, double* v_wall) {
+  using Original = void (*)(FixMeshSurface*, int, double*, double*, int, double*);
+  static const auto original =
+      solidcull::engine::own<Original>("_ZN9LAMMPS_NS14FixMeshSurface25add_particle_contributionEiPdS1_iS1_");
+  solidcull::MeshLoads::contact(this, ip, frc, delta, iTri);
+  original(this, ip, frc, delta, iTri, v_wall);
+}
+
+}  // namespace LAMMPS_NS
+
+extern "C" {
+
+void solidcull_register(void* lammps) {
+  auto* lmp = static_cast<LAMMPS_NS::LAMMPS*>(lammps);
+  solidcull::engine::fix_styles(*lmp->modify)["solid/cull"] = make_fix;
+}
+
+void solidcull_region(void* lammps, int words, char** word) {
+  add_interface_mesh(static_cast<LAMMPS_NS::LAMMPS*>(lammps), words, word);
+}
+
+const char* solidcull_version(void) { return SOLIDCULL_VERSION; }
+}

@@ -1,0 +1,54 @@
+#include "run.h"
+
+#include <cstdio>
+#include <cstring>
+
+#include "comm.h"
+#include "domain.h"
+#include "fix_gravity.h"
+#include "modify.h"
+#include "neighbor.h"
+#include "update.h"
+
+namespace solidcull {
+
+void EngineRun::renew() {
+  step = update->ntimestep;
+  dt = update->dt;
+  skin = neighbor->skin;
+  box = {vec(domain->boxlo), vec(domain->boxhi)};
+  own = {vec(domain->sublo), vec(domain->subhi)};
+  periodic = {domain->xperiodic != 0, domain->yperiodic != 0, domain->zperiodic != 0};
+}
+
+Vec3 EngineRun::gravity() const {
+  Vec3 g = Vec3::Zero();
+  for (int f = 0; f < modify->nfix; ++f)
+    if (std::strcmp(modify->fix[f]->style, "gravity") == 0) {
+      double one[3];
+      static_cast<LAMMPS_NS::FixGravity*>(modify->fix[f])->get_gravity(one);
+      g += vec(one);
+    }
+  return g;
+}
+
+Vec3 EngineRun::wrapped(const Vec3& place) const {
+  double x[3];
+  set(x, place);
+  domain->remap(x);
+  return vec(x);
+}
+
+bool EngineRun::ask_for_reneighbouring(std::int64_t at) {
+  const bool is_new = own_->next_reneighbor != at;
+  own_->next_reneighbor = at;
+  return is_new;
+}
+
+void EngineRun::say(const std::string& line) const {
+  if (comm->me != 0) return;
+  for (FILE* to : {screen, logfile})
+    if (to) std::fprintf(to, "fix %s solid/cull: %s\n", name.c_str(), line.c_str());
+}
+
+}  // namespace solidcull

@@ -1,0 +1,61 @@
+// What went in and out of the store: counts, mass and energy (invariants I2 and I4). Local to the rank.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "exact_sum.h"
+#include "granule_store.h"
+
+namespace solidcull {
+
+class Ledger {
+ public:
+  /// The granule leaves the engine for the store.
+  void stored(const StoredGranule& g) {
+    ++in_;
+    book(g, +1);
+  }
+  /// It comes back to the engine.
+  void returned(const StoredGranule& g) {
+    ++out_;
+    book(g, -1);
+  }
+  void locked() { ++locked_; }
+  /// A granule is free again; `energy` (J) is what that added to the kinetic energy of granule and body: zero but for a restore
+  /// in the very step of the cull, which gives back what that cull took.
+  void restored(double energy) {
+    ++restored_;
+    energy_ += energy;
+  }
+  void carved() { ++carves_; }
+
+  /// What the books say should be in the store, against what is there. Exact but for rounding.
+  double mass_error(const GranuleStore& store) const { return store.mass() - mass_.value(); }
+  std::int64_t count_due() const { return in_ - out_; }
+
+  std::int64_t granules_locked() const { return locked_; }
+  std::int64_t granules_restored() const { return restored_; }
+  std::int64_t carves() const { return carves_; }
+  double energy_added() const { return energy_.value(); }
+
+  /// Counters as numbers for a restart file, and back.
+  std::array<double, 4> counters() const {
+    return {static_cast<double>(locked_), static_cast<double>(restored_), static_cast<double>(carves_), energy_.value()};
+  }
+  void set_counters(const std::array<double, 4>& c) {
+    locked_ = static_cast<std::int64_t>(c[0]);
+    restored_ = static_cast<std::int64_t>(c[1]);
+    carves_ = static_cast<std::int64_t>(c[2]);
+    energy_ = ExactSum();
+    energy_ += c[3];
+  }
+
+ private:
+  void book(const StoredGranule& g, int sign) { mass_ += sign * g.mass; }
+
+  std::int64_t in_ = 0, out_ = 0, locked_ = 0, restored_ = 0, carves_ = 0;
+  ExactSum mass_, energy_;
+};
+
+}  // namespace solidcull

@@ -1,0 +1,273 @@
+#include "solid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "contacts_in_store.h"
+
+namespace solidcull {
+
+// ------------------------------------------------------------------------------------------------------------ the deck
+
+void Solid::open_store() {
+  const bool compact = scales_.compact();
+  store_ = std::make_unique<GranuleStore>(2 * scales_.diameter(),
+                                          compact ? GranuleStore::Precision::rounded : GranuleStore::Precision::exact);
+  bodies_.set_elsewhere([this](std::int64_t tag) { return store_->body_of(tag); });
+  if (!compact) return;
+  contacts_.set_elsewhere(
+      [this](std::int64_t tag, std::vector<std::int64_t>& partners) { contacts_in_store(*store_, bodies_, tag, partners); });
+}
+
+bool Solid::set_histories(const std::vector<bool>& flips, const std::vector<int>& vectors) {
+  const bool in_use = contacts_.size() > 0 || (scales_.compact() && store_ && store_->size() > 0);
+  if (in_use && flips != contacts_.layout()) return false;
+  contacts_.set_layout(flips);
+  contacts_.set_vectors(vectors);
+  packed_.set_layout(contacts_.width(), contacts_.vectors());
+  return true;
+}
+
+void Solid::know_radius(int type, double radius) {
+  double& largest = largest_radius_by_type_[static_cast<std::size_t>(type)];
+  largest = std::max(largest, radius);
+}
+
+// ------------------------------------------------------------------------------------------------------------ what there is
+
+Vec3 Solid::nearest_image(const Vec3& x, const Vec3& to) const {
+  Vec3 image = x;
+  const Vec3& edge = bodies_.periods();
+  for (int d = 0; d < 3; ++d)
+    if (edge[d] > 0) image[d] -= edge[d] * std::round((x[d] - to[d]) / edge[d]);
+  return image;
+}
+
+double Solid::kinetic_energy(int body) const { return exists(body) ? bodies_.body(body).part().kinetic_energy() : 0.0; }
+
+/// From a to the image of b that it touches, in the frame of their body.
+Vec3 Solid::apart(const Resident& a, const Resident& b) const {
+  const Vec3 there = b.position - a.position;
+  if ((bodies_.periods().array() == 0).all()) return there;
+  const Pose& pose = bodies_.pose(a.body);
+  return pose.turned_to_frame(nearest_image(pose.turned_to_world(there), Vec3::Zero()));
+}
+
+bool Solid::inner_history(const Resident& g, std::int64_t partner, double* history) const {
+  const Resident other = *store_->find(partner);
+  std::vector<std::uint64_t> tail;
+  store_->tail(g.tag, tail);
+  std::size_t at = packed_.find(tail, partner);
+  if (at < tail.size()) {
+    packed_.unpack(&tail[at], apart(g, other), history);
+    return true;
+  }
+  store_->tail(partner, tail);
+  at = packed_.find(tail, g.tag);
+  if (at == tail.size()) return false;
+  packed_.unpack(&tail[at], apart(other, g), history);
+  contacts_.change_side(history);
+  return true;
+}
+
+// ------------------------------------------------------------------------------------------------------------ bodies
+
+void Solid::split(const MassOf& mass_of, const std::function<void(std::int64_t, int, const Vec3&)>& moved) {
+  std::set<int> came_off;
+  bodies_.split(contacts_, mass_of, [&](std::int64_t tag, int body, const Vec3& place) {
+    came_off.insert(body);
+    if (!store_->contains(tag)) {
+      moved(tag, body, place);
+      return;
+    }
+    const int from = store_->body_of(tag);
+    if (store_->frame_of(from) == GranuleStore::shared_frame) store_->share(body, true);
+    wall_loads_.move(tag, from, body);
+    store_->move(tag, body, place);
+  });
+  if (!scales_.sleeping()) return;
+  came_off.insert(bodies_.split_parents().begin(), bodies_.split_parents().end());
+  for (const int body : came_off)
+    if (exists(body)) find_grid(body);
+}
+
+void Solid::turn_contacts(std::int64_t tag, const Eigen::Matrix3d& by) {
+  contacts_.turn(tag, by, [&](std::int64_t partner) { return partner > tag || !bodies_.body_of(partner); });
+}
+
+std::vector<Solid::Merge> Solid::adopt_swallowed() {
+  for (const auto& gone : bodies_.swallowed()) {
+    const int body = bodies_.root(gone.first);
+    const Pose &from = gone.second, &to = bodies_.pose(body);
+    const bool same = from == to;
+    const Eigen::Matrix3d turn = to.turn().transpose() * from.turn();
+    if (scales_.compact() && !same) turn_inner_histories(gone.first, turn);
+    if (store_->holds(gone.first) && store_->frame_of(gone.first) != GranuleStore::shared_frame)
+      ++standing_version_;  // its granules may stand from now on
+    store_->merge(gone.first, body, [&](StoredGranule& g) {
+      if (same) return;
+      g.position = to.to_frame(from.to_world(g.position));
+      g.load_change = turn * g.load_change;
+      turn_contacts(g.tag, turn);
+    });
+    wall_loads_.merge(gone.first, body);
+    tell([&](BodyFollower& f) { f.merged(gone.first, body, same); });
+    if (scales_.sleeping()) find_grid(body);
+  }
+  std::vector<Merge> merges;
+  for (const auto& m : bodies_.take_merges()) merges.push_back({m.first, m.second, bodies_.pose(m.second)});
+  bodies_.forget_swallowed();
+  return merges;
+}
+
+void Solid::ground(int body, bool on) {
+  SolidBody& b = bodies_.body(body);
+  if (b.grounded == on) return;
+  b.ground(on);
+  if (on && store_->holds(body)) ++standing_version_;
+  tell([&](BodyFollower& f) { f.grounded_or_let_go(body); });
+  find_grid(body);
+}
+
+void Solid::reframe_one(int body, const GranuleMass& in_world) {
+  bodies_.body(body).reframe_one(in_world);
+  tell([&](BodyFollower& f) { f.frame_changed(body); });
+}
+
+/// Bodies that stand still and have never moved share the world's frame.
+void Solid::find_grid(int body) {
+  const SolidBody& b = bodies_.body(body);
+  const bool shares = b.grounded && b.pose == Pose();
+  if (!shares && store_->frame_of(body) == GranuleStore::shared_frame) tell([&](BodyFollower& f) { f.left_shared_grid(body); });
+  store_->share(body, shares);
+}
+
+void Solid::forget(int body) {
+  store_->forget(body);
+  tell([&](BodyFollower& f) { f.forgotten(body); });
+}
+
+// ------------------------------------------------------------------------------------------------------------ contacts
+
+void Solid::turn_frozen() {
+  contacts_.turn_all_unturned([&](std::int64_t low, std::int64_t high) -> Eigen::Matrix3d {
+    const int body = bodies_.body_of(low);
+    return bodies_.pose(body ? body : bodies_.body_of(high)).turn().transpose();
+  });
+}
+
+void Solid::leave_rank(std::int64_t tag) {
+  struct Kept {
+    std::int64_t tag, partner;
+    std::vector<double> history;  // as tag sees it
+  };
+  std::vector<Kept> kept;
+  contacts_.for_each(tag, [&](std::int64_t partner, const double* history) {
+    if (bodies_.body_of(partner)) kept.push_back({partner, tag, history ? contacts_.turned(history) : std::vector<double>()});
+  });
+  contacts_.erase(tag);
+  for (const Kept& c : kept) contacts_.add(c.tag, c.partner, c.history.empty() ? nullptr : c.history.data());
+}
+
+void Solid::turn_inner_histories(int body, const Eigen::Matrix3d& by) {
+  std::vector<Resident> granules;
+  store_->for_each_of_body(body, [&](const Resident& g) { granules.push_back(g); });
+  std::vector<double> history(contacts_.width());
+  std::vector<std::uint64_t> tail, turned;
+  for (const Resident& g : granules) {
+    store_->tail(g.tag, tail);
+    if (tail.empty()) continue;
+    turned.clear();
+    contacts_.for_each_elsewhere(g.tag, [&](std::int64_t partner) {
+      const std::size_t at = packed_.find(tail, partner);
+      if (at == tail.size()) return;
+      const Vec3 normal = apart(g, *store_->find(partner));
+      packed_.unpack(&tail[at], normal, history.data());
+      contacts_.turn(history.data(), by);
+      packed_.pack(partner, history.data(), by * normal, turned);
+    });
+    store_->set_tail(g.tag, turned);
+  }
+}
+
+// ------------------------------------------------------------------------------------------------------------ the store
+
+/// The store says itself which body a granule is in; a compact one also what it touches there, and of the histories of those
+/// contacts few bits are kept.
+void Solid::entered_store(std::int64_t tag) {
+  bodies_.leave(tag);
+  if (!scales_.compact()) return;
+  const Resident g = *store_->find(tag);
+  std::vector<std::int64_t> partners;
+  contacts_.for_each_partner(tag, [&](std::int64_t partner) { partners.push_back(partner); });
+  std::vector<std::uint64_t> tail;
+  contacts_.for_each(tag, [&](std::int64_t partner, const double* history) {
+    if (!history || contacts_.width() == 0 || !store_->contains(partner)) return;
+    if (std::any_of(partners.begin(), partners.end(),
+                    [&](std::int64_t p) { return p != partner && PackedHistory::alike(p, partner); }))
+      return;
+    packed_.pack(partner, history, apart(g, *store_->find(partner)), tail);
+  });
+  if (!tail.empty()) store_->set_tail(tag, tail);
+  contacts_.drop(tag, [&](std::int64_t partner) { return store_->contains(partner); });
+}
+
+void Solid::leaves_store(std::int64_t tag) {
+  const Resident g = *store_->find(tag);
+  bodies_.take_in(tag, g.body);
+  if (!scales_.compact()) return;
+  std::vector<double> history(contacts_.width());
+  std::vector<std::uint64_t> tail;
+  contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) {
+    contacts_.add(tag, partner, inner_history(g, partner, history.data()) ? history.data() : nullptr);
+    store_->tail(partner, tail);
+    const auto at = tail.begin() + static_cast<std::ptrdiff_t>(packed_.find(tail, tag));
+    if (at == tail.end()) return;
+    tail.erase(at, at + static_cast<std::ptrdiff_t>(packed_.words()));
+    store_->set_tail(partner, tail);
+  });
+}
+
+StoredGranule Solid::as_stored(const StoredGranule& g) {
+  const StoredGranule kept = store_->rounded(g);
+  // else many small ways add up when they leave
+  if (scales_.compact()) bodies_.shift(g.body, {g.mass, g.position, g.radius, g.held}, kept.position);
+  return kept;
+}
+
+void Solid::put_away(const StoredGranule& g, const std::vector<double>& record, const std::vector<int>& transient,
+                     const std::vector<WallLoad>& loads) {
+  if (!loads.empty()) wall_loads_.add(g.tag, g.body, loads);
+  store_->add(g, record.data(), static_cast<int>(record.size()), transient);
+  entered_store(g.tag);
+  ledger_.stored(g);
+  know_radius(g.type, g.radius);
+}
+
+StoredGranule Solid::bring_back(std::int64_t tag, std::vector<double>& record) {
+  leaves_store(tag);
+  const StoredGranule g = store_->take(tag, record);
+  ledger_.returned(g);
+  wall_loads_.erase(tag, g.body);
+  return g;
+}
+
+void Solid::add_stored(const StoredGranule& g, const double* record, int length) {
+  store_->add(g, record, length);
+  ledger_.stored(g);
+  know_radius(g.type, g.radius);
+}
+
+std::size_t Solid::fit() {
+  const std::size_t before = contacts_.memory_bytes() + bodies_.member_bytes();
+  contacts_.fit();
+  bodies_.fit();
+  return before - contacts_.memory_bytes() - bodies_.member_bytes();
+}
+
+std::size_t Solid::memory_bytes() const {
+  return contacts_.memory_bytes() + bodies_.member_bytes() + (store_ ? store_->memory_bytes() : 0);
+}
+
+}  // namespace solidcull

@@ -1,0 +1,186 @@
+// Everything that is culled on this rank: bodies, the granule store, frozen contacts and wall loads, the ledger. The one class
+// that changes them, and always together.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "frozen_contacts.h"
+#include "frozen_wall_loads.h"
+#include "granule_store.h"
+#include "ledger.h"
+#include "packed_history.h"
+#include "scales.h"
+#include "solid_bodies.h"
+
+namespace solidcull {
+
+/// Whoever keeps something for each body follows what becomes of bodies. Called after the solid has changed. Local.
+class BodyFollower {
+ public:
+  virtual ~BodyFollower() = default;
+  /// `gone` was swallowed by `kept`; same_frame: its granules stand as they stood.
+  virtual void merged(int /*gone*/, int /*kept*/, bool /*same_frame*/) {}
+  virtual void grounded_or_let_go(int /*body*/) {}
+  /// The frame of the body is another one now.
+  virtual void frame_changed(int /*body*/) {}
+  /// Its stored granules have left the grid that bodies share which stand still.
+  virtual void left_shared_grid(int /*body*/) {}
+  virtual void forgotten(int /*body*/) {}  ///< nothing of it is left
+};
+
+/// SI units. Local to the rank.
+class Solid {
+ public:
+  using MassOf = SolidBodies::MassOf;
+
+  explicit Solid(const Scales& scales) : scales_(scales) {}
+  Solid(const Solid&) = delete;
+
+  void followed_by(BodyFollower& follower) { followers_.push_back(&follower); }
+
+  // --- the deck
+  /// Search cells take their size from the scales, which are known by now.
+  void open_store();
+  bool has_store() const { return store_ != nullptr; }
+  /// Edges of the periodic box, 0 where it is not periodic (m).
+  void set_periods(const Vec3& edges) { bodies_.set_periods(edges); }
+  /// Layout of the contact histories: which change sign with the side, which are vectors. False, and nothing happens, if another
+  /// layout is in use.
+  bool set_histories(const std::vector<bool>& flips, const std::vector<int>& vectors);
+  /// A granule of this type and size is stored, or will be.
+  void know_radius(int type, double radius);
+  void set_types(int types) { largest_radius_by_type_.assign(static_cast<std::size_t>(types) + 1, 0.0); }
+
+  // --- what there is
+  const SolidBodies& bodies() const { return bodies_; }
+  const GranuleStore& store() const { return *store_; }
+  const FrozenContacts& contacts() const { return contacts_; }
+  const FrozenWallLoads& wall_loads() const { return wall_loads_; }
+  const Ledger& ledger() const { return ledger_; }
+  const std::vector<double>& largest_radius_by_type() const { return largest_radius_by_type_; }
+  /// Granules that are locked here, interface and interior.
+  std::size_t locked() const { return bodies_.locked() + store_->size(); }
+  bool exists(int body) const { return bodies_.bodies().count(body) != 0; }
+  /// Its granules at still walls may be stored.
+  bool stands(int body) const { return !scales_.rigid() || bodies_.body(body).grounded; }
+  /// A body is in balance when what is left over is less than this share of its weight.
+  static constexpr double balance_share = 0.002;
+  /// The walls' frozen loads on this rank's stored granules of the body are in balance with its weight.
+  bool walls_bear(int body, const Vec3& gravity) const {
+    const double mass = bodies_.body(body).mass.mass;
+    return (wall_loads_.force(body) + mass * gravity).norm() < balance_share * mass * scales_.gravity();
+  }
+  bool frame_stands(int frame) const { return frame == GranuleStore::shared_frame || stands(frame); }
+  /// Of a frame of the store: that of its body, or the world.
+  const Pose& pose_of_frame(int frame) const {
+    static const Pose world;
+    return frame == GranuleStore::shared_frame ? world : bodies_.pose(frame);
+  }
+  Vec3 in_world(const Resident& g) const { return bodies_.pose(g.body).to_world(g.position); }
+  /// The periodic image of x that is nearest to the place `to`.
+  Vec3 nearest_image(const Vec3& x, const Vec3& to) const;
+  double kinetic_energy(int body) const;
+  /// Counts how often stored granules came to stand still in other ways than by being put away.
+  int standing_version() const { return standing_version_; }
+  /// History of a contact inside a compact store, as g sees it; false if it has none.
+  bool inner_history(const Resident& g, std::int64_t partner, double* history) const;
+
+  // --- bodies
+  SolidBodies::Place lock(std::int64_t tag, const MovingGranule& granule, const MassOf& mass_of) {
+    return bodies_.lock(tag, granule, contacts_, mass_of);
+  }
+  void tie(std::int64_t a, std::int64_t b, const MassOf& mass_of) { bodies_.join(a, b, mass_of); }
+  /// See SolidBodies::unlock.
+  void unlock(std::int64_t tag, const GranuleMass& granule, const MovingGranule* given = nullptr) {
+    bodies_.unlock(tag, granule, contacts_, given);
+  }
+  /// After unlock(): bodies that came apart become several. moved(tag, body, place) is called for granules of a part that came
+  /// off which are no stored ones.
+  void split(const MassOf& mass_of, const std::function<void(std::int64_t, int, const Vec3&)>& moved);
+  struct Merge {
+    int kept, swallowed;
+    Pose pose;  // of the swallowed one
+  };
+  /// After lock() and tie(): the stored granules of swallowed bodies move to the frames in which they are now; the interface
+  /// granules' contacts were turned before, see turn_contacts(). Returns the merges since the last call, in their order.
+  std::vector<Merge> adopt_swallowed();
+  /// Histories of this granule's contacts turn with its frame; those shared with another member only once, by the lower tag.
+  void turn_contacts(std::int64_t tag, const Eigen::Matrix3d& by);
+  SolidBody& body(int number) { return bodies_.body(number); }
+  std::map<int, SolidBody>& bodies_in_motion() { return bodies_.bodies(); }
+  void ground(int body, bool on);
+  /// A grounded body of one granule, which is a sphere whatever way it is turned: the world's frame becomes its frame.
+  void reframe_one(int body, const GranuleMass& in_world);
+  /// Nothing is left of a body of this number.
+  void forget(int body);
+
+  // --- frozen contacts
+  void freeze(std::int64_t tag, std::int64_t partner, const double* history_in_world) {
+    contacts_.add_unturned(tag, partner, history_in_world);
+  }
+  void freeze_in_frame(std::int64_t tag, std::int64_t partner, const double* history) { contacts_.add(tag, partner, history); }
+  /// Now that each granule has its body, histories are turned into the frames in which they wait.
+  void turn_frozen();
+  void thaw(std::int64_t tag) { contacts_.erase(tag); }
+  /// Contacts of a granule that leaves for another rank; those with what stays are kept.
+  void leave_rank(std::int64_t tag);
+
+  // --- the store
+  /// g as the store will hold it; what it moves by then is told to its body.
+  StoredGranule as_stored(const StoredGranule& g);
+  void put_away(const StoredGranule& g, const std::vector<double>& record, const std::vector<int>& transient,
+                const std::vector<WallLoad>& loads);
+  /// It leaves the store and is an interface granule of its body again; `record` receives its engine record.
+  StoredGranule bring_back(std::int64_t tag, std::vector<double>& record);
+  void forget_transient() { store_->forget_transient(); }
+
+  // --- from a restart file or another rank; enter_store() once all contacts are there
+  int found(const SolidBody& body) { return bodies_.found(body); }
+  void take_in(std::int64_t tag, int body) { bodies_.take_in(tag, body); }
+  void add_stored(const StoredGranule& g, const double* record, int length);
+  void enter_store(std::int64_t tag) { entered_store(tag); }
+  void stands_otherwise() { ++standing_version_; }
+
+  // --- walls
+  double weigh_wall_loads(int body, const Vec3& load) { return wall_loads_.weigh(body, load); }
+  void share_out_wall_loads(int body, double sum) { wall_loads_.share_out(body, sum); }
+
+  // --- the ledger
+  void count_locked() { ledger_.locked(); }
+  void count_restored(double energy) { ledger_.restored(energy); }
+  void count_carves(std::size_t n) {
+    for (; n > 0; --n) ledger_.carved();
+  }
+  void set_counters(const std::array<double, 4>& c) { ledger_.set_counters(c); }
+
+  /// Gives memory back that was needed once; returns how many bytes.
+  std::size_t fit();
+  std::size_t memory_bytes() const;
+
+ private:
+  void find_grid(int body);
+  void entered_store(std::int64_t tag);
+  void leaves_store(std::int64_t tag);
+  Vec3 apart(const Resident& a, const Resident& b) const;
+  void turn_inner_histories(int body, const Eigen::Matrix3d& by);
+  template <class Tell>
+  void tell(Tell tell) {
+    for (BodyFollower* f : followers_) tell(*f);
+  }
+
+  const Scales& scales_;
+  std::vector<BodyFollower*> followers_;
+  std::unique_ptr<GranuleStore> store_;
+  FrozenContacts contacts_;
+  PackedHistory packed_;  // of contacts in a compact store: in the tail of the granule that went in later
+  SolidBodies bodies_;
+  FrozenWallLoads wall_loads_;  // of stored granules
+  Ledger ledger_;
+  std::vector<double> largest_radius_by_type_;
+  int standing_version_ = 0;
+};
+
+}  // namespace solidcull

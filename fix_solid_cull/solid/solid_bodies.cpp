@@ -1,0 +1,367 @@
+#include "solid_bodies.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "parts_that_came_off.h"
+
+namespace solidcull {
+
+void MassProperties::add(double m, const Vec3& x, double r, int sign, bool is_held) {
+  if (count == 0) *this = MassProperties{0, x};
+  const Vec3 arm = x - about;
+  count += sign;
+  mass += sign * m;
+  first += sign * m * arm;
+  second += sign * m * arm * arm.transpose();
+  spin += sign * 0.4 * m * r * r;
+  if (is_held) held += sign;
+}
+
+void MassProperties::add(const MassProperties& other, int sign) {
+  if (count == 0) *this = MassProperties{0, other.about};
+  const Vec3 arm = other.about - about;
+  count += sign * other.count;
+  mass += sign * other.mass;
+  first += sign * (other.first + other.mass * arm);
+  second +=
+      sign * (other.second + other.first * arm.transpose() + arm * other.first.transpose() + other.mass * arm * arm.transpose());
+  spin += sign * other.spin;
+  held += sign * other.held;
+}
+
+Eigen::Matrix3d MassProperties::inertia() const {
+  const Eigen::Matrix3d about_centre = second - first * first.transpose() / mass;
+  return (about_centre.trace() + spin) * Eigen::Matrix3d::Identity() - about_centre;
+}
+
+MassProperties MassProperties::seen_from(const Pose& here, const Pose& there) const {
+  const Eigen::Matrix3d turn = there.turn().transpose() * here.turn();
+  MassProperties p = *this;
+  p.about = there.to_frame(here.to_world(about));
+  p.first = turn * first;
+  p.second = turn * second * turn.transpose();
+  return p;
+}
+
+RigidPart SolidBody::part() const {
+  const Eigen::Matrix3d turn = pose.turn();
+  const Vec3 centre = pose.to_world(mass.centre());
+  return {mass.mass, centre, turn * mass.inertia() * turn.transpose(), twist.at(centre), twist.spin};
+}
+
+FreeAxes SolidBody::free_axes(const std::array<bool, 3>& spans) {
+  return {!spans[1] && !spans[2], !spans[0] && !spans[2], !spans[0] && !spans[1]};
+}
+
+void SolidBody::ground(bool on) {
+  grounded = on;
+  grounded_mass = on ? mass.mass : 0.0;
+  changed = true;
+  step_then = -1;
+  acceleration = Vec3::Zero();
+  twist = {pose.to_world(mass.centre()), Vec3::Zero(), is_one_granule() ? twist.spin : Vec3(Vec3::Zero())};
+}
+
+void SolidBody::reframe_one(const GranuleMass& in_world) {
+  felt = pose.turned_to_world(felt);
+  mass = MassProperties();
+  mass.add(in_world.mass, in_world.position, in_world.radius, 1, in_world.held);
+  pose = Pose();
+}
+
+void SolidBody::settle() {
+  const RigidPart all = part();
+  motion = RigidMotion(&all, 1, free_axes());
+  take_twist();
+  changed = false;
+}
+
+void SolidBody::settle_as_part(const std::vector<RigidPart>& parts, const FreeAxes& free, const Vec3& shift,
+                               double grounded_share) {
+  if (grounded) grounded_mass = grounded_share * mass.mass;
+  motion = RigidMotion(parts.data(), static_cast<int>(parts.size()), free);
+  motion.shift(-shift);
+  if (grounded) motion.stop();
+  take_twist();
+  changed = false;
+}
+
+void SolidBody::feel_as(const SolidBody& from) {
+  if (felt_known || !from.felt_known) return;
+  feel(pose.turned_to_frame(from.pose.turned_to_world(from.felt)));
+  acceleration = from.acceleration;
+}
+
+int SolidBodies::root(int body) const {
+  while (parent_[body] != body) body = parent_[body] = parent_[parent_[body]];
+  return body;
+}
+
+int SolidBodies::body_of(std::int64_t tag) const {
+  const int* body = member_.find(narrow_tag(tag));
+  if (body) return root(*body);
+  const int other = elsewhere_ ? elsewhere_(tag) : 0;
+  return other ? root(other) : 0;
+}
+
+const Pose& SolidBodies::pose(int number) const {
+  const auto gone = swallowed_.find(number);
+  return gone == swallowed_.end() ? bodies_.at(number).pose : gone->second;
+}
+
+Vec3 SolidBodies::to_image_of(const Vec3& there) const {
+  Vec3 shift = Vec3::Zero();
+  for (int d = 0; d < 3; ++d)
+    if (periods_[d] > 0) shift[d] = -periods_[d] * std::round(there[d] / periods_[d]);
+  return shift;
+}
+
+int SolidBodies::found() {
+  const int number = static_cast<int>(parent_.size());
+  parent_.push_back(number);
+  bodies_[number];
+  return number;
+}
+
+int SolidBodies::found(const SolidBody& body) {
+  const int number = found();
+  bodies_[number] = body;
+  return number;
+}
+
+/// The mean acceleration is that of the centre of mass: where the centre is another one now, the velocity that it began with is
+/// too.
+void SolidBodies::centre_moved(SolidBody& body, const Vec3& from) {
+  const Vec3 to = body.pose.to_world(body.mass.centre());
+  body.velocity_then += body.twist.spin.cross(to - from);
+}
+
+void SolidBodies::stand_still(SolidBody& body) { body.twist.velocity = body.twist.spin = Vec3::Zero(); }
+
+/// The body's velocity field becomes that of body and part tied together. The mass properties are the caller's.
+void SolidBodies::add(SolidBody& body, const RigidPart& part) {
+  body.changed = true;
+  if (body.mass.count == 0) {
+    body.twist = {part.centre, part.velocity, part.spin};
+    if (body.grounded) stand_still(body);
+    return;
+  }
+  if (body.grounded) {
+    stand_still(body);
+    return;
+  }
+  const RigidPart parts[] = {body.part(), part};
+  body.twist = RigidMotion(parts, 2, body.free_axes()).twist();
+}
+
+int SolidBodies::merge(int a, int b, Vec3 shift) {
+  // the larger body keeps its number, so that colours in pictures stay
+  if (bodies_[a].mass.count < bodies_[b].mass.count || (bodies_[a].mass.count == bodies_[b].mass.count && a > b)) {
+    std::swap(a, b);
+    shift = -shift;
+  }
+  SolidBody& kept = bodies_[a];
+  SolidBody& gone = bodies_[b];
+  if (!shift.isZero(0)) {
+    gone.pose.shift(shift);
+    gone.twist.point += shift;
+    for (auto& s : swallowed_)
+      if (root(s.first) == b) s.second.shift(shift);
+  }
+  for (int d = 0; d < 3; ++d) kept.spans[d] = kept.spans[d] || gone.spans[d];
+  kept.grounded = kept.grounded || gone.grounded;
+  kept.grounded_mass += gone.grounded_mass;
+  add(kept, gone.part());
+  if (kept.felt_known && gone.felt_known) {
+    const double share = gone.mass.mass / (kept.mass.mass + gone.mass.mass);
+    kept.felt += share * (kept.pose.turned_to_frame(gone.pose.turned_to_world(gone.felt)) - kept.felt);
+  }
+  kept.step_then = -1;
+  kept.mass.add(kept.pose == gone.pose ? gone.mass : gone.mass.seen_from(gone.pose, kept.pose));
+  kept.summed = std::max(kept.summed, kept.mass.count);
+  swallowed_[b] = gone.pose;
+  bodies_.erase(b);
+  parent_[b] = a;
+  merges_.emplace_back(a, b);
+  return a;
+}
+
+int SolidBodies::tie(int a, Vec3& position_in_a, int b, const Vec3& position_in_b) {
+  const Vec3 shift = to_image_of(position_in_b - position_in_a);
+  if (a == b) {
+    for (int d = 0; d < 3; ++d)
+      if (shift[d] != 0 && !bodies_[a].spans[d]) bodies_[a].spans[d] = bodies_[a].changed = true;
+    return a;
+  }
+  const int kept = merge(a, b, shift);
+  if (kept != a) position_in_a -= shift;
+  return kept;
+}
+
+SolidBodies::Place SolidBodies::lock(std::int64_t tag, const MovingGranule& granule, const FrozenContacts& contacts,
+                                     const MassOf& mass_of) {
+  int number = 0;
+  Vec3 position = granule.position;
+  const auto join = [&](int body) {
+    SolidBody& b = bodies_[body];
+    const bool first = b.mass.count == 0;
+    const Vec3 before = first ? Vec3(Vec3::Zero()) : b.pose.to_world(b.mass.centre());
+    add(b, RigidPart::granule(granule.mass, granule.radius, position, granule.velocity, granule.spin));
+    b.mass.add(granule.mass, b.pose.to_frame(position), granule.radius, 1, granule.held);
+    b.summed = std::max(b.summed, b.mass.count);
+    if (!first) centre_moved(b, before);
+    member_[narrow_tag(tag)] = number = body;
+  };
+  contacts.for_each_partner(tag, [&](std::int64_t partner) {
+    const int theirs = body_of(partner);
+    if (!theirs) return;
+    if (number == theirs && (periods_.array() == 0).all()) return;
+    const Vec3 there = bodies_[theirs].pose.to_world(mass_of(partner).position);
+    if (!number) {
+      position -= to_image_of(there - position);
+      join(theirs);
+    } else {
+      number = tie(number, position, theirs, there);
+    }
+  });
+  if (!number) join(found());
+  return {number, bodies_[number].pose.to_frame(position)};
+}
+
+void SolidBodies::join(std::int64_t a, std::int64_t b, const MassOf& mass_of) {
+  const int of_a = body_of(a), of_b = body_of(b);
+  if (!of_a || !of_b) return;
+  Vec3 in_a = bodies_[of_a].pose.to_world(mass_of(a).position);
+  tie(of_a, in_a, of_b, bodies_[of_b].pose.to_world(mass_of(b).position));
+}
+
+void SolidBodies::unlock(std::int64_t tag, const GranuleMass& granule, const FrozenContacts& contacts,
+                         const MovingGranule* given) {
+  const int number = body_of(tag);
+  if (!number) return;
+  member_.erase(narrow_tag(tag));
+  contacts.for_each_partner(tag, [&](std::int64_t partner) { cut_.push_back(partner); });
+  SolidBody& body = bodies_[number];
+  body.changed = true;
+  const Vec3 before = body.pose.to_world(body.mass.centre());
+  body.mass.add(granule.mass, granule.position, granule.radius, -1, granule.held);
+  if (body.mass.count == 0) {
+    bodies_.erase(number);
+    return;
+  }
+  centre_moved(body, before);
+  if (body.grounded) stand_still(body);
+  if (!given || body.grounded) return;
+  // the difference to the body's own field stays with the body
+  RigidPart rest = body.part();
+  const Vec3 own_velocity = body.twist.at(given->position), own_spin = body.twist.spin;
+  const RigidPart difference =
+      RigidPart::granule(given->mass, given->radius, given->position, own_velocity - given->velocity, own_spin - given->spin);
+  const Vec3 momentum = difference.mass * difference.velocity;
+  const Vec3 turning = difference.angular_momentum(rest.centre);
+  RigidMotion motion(&rest, 1, body.free_axes());
+  motion.kick(momentum, turning, 1.0);
+  body.twist = motion.twist();
+}
+
+void SolidBodies::sum_anew(int number, std::int64_t member, const FrozenContacts& contacts, const MassOf& mass_of) {
+  // what was added and taken away leaves rounding behind, which would grow against a body that shrinks
+  std::vector<std::int64_t> reached = {member};
+  FlatMap<char> seen;
+  seen[member] = 1;
+  for (std::size_t at = 0; at < reached.size(); ++at)
+    contacts.for_each_partner(reached[at], [&](std::int64_t partner) {
+      if (!is_member(partner) || seen.contains(partner)) return;
+      seen[partner] = 1;
+      reached.push_back(partner);
+    });
+  MassProperties sum;
+  for (const std::int64_t tag : reached) {
+    const GranuleMass g = mass_of(tag);
+    sum.add(g.mass, g.position, g.radius, 1, g.held);
+  }
+  bodies_[number].mass = sum;
+  bodies_[number].summed = sum.count;
+}
+
+void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
+                        const std::function<void(std::int64_t, int, const Vec3&)>& moved) {
+  std::map<int, std::vector<std::int64_t>> sources;
+  for (const std::int64_t tag : cut_)
+    if (const int body = body_of(tag)) sources[body].push_back(tag);
+  cut_.clear();
+
+  split_parents_.clear();
+  for (auto& [body, tags] : sources) {
+    std::sort(tags.begin(), tags.end());
+    tags.erase(std::unique(tags.begin(), tags.end()), tags.end());
+    const bool was_grounded = bodies_[body].grounded;
+    const double grounded_mass = bodies_[body].grounded_mass, whole = bodies_[body].mass.mass;
+    for (const std::vector<std::int64_t>& part : parts_that_came_off(
+             tags, contacts, [&](std::int64_t tag) { return is_member(tag); },
+             [&](std::int64_t tag) { return mass_of(tag).position; })) {
+      const int fresh = found();
+      SolidBody& off = bodies_[fresh];
+      SolidBody& rest = bodies_[body];
+      off = rest;  // same frame, same velocity field, same load at locking
+      off.mass = MassProperties();
+      off.step_then = rest.step_then = -1;
+      off.changed = rest.changed = true;
+      off.spans = {};
+      MassProperties gone;
+      for (const std::int64_t tag : part) {
+        const GranuleMass g = mass_of(tag);
+        gone.add(g.mass, g.position, g.radius, 1, g.held);
+      }
+      rest.mass.add(gone, -1);
+      // what was tied to its own image may hang free of it now: its places are brought together again
+      FlatMap<int> index;
+      std::vector<Vec3> place;
+      const bool tied = rest.spans[0] || rest.spans[1] || rest.spans[2];
+      std::vector<std::int64_t> order = {part.front()};
+      index[order.front()] = 0;
+      place.push_back(mass_of(order.front()).position);
+      for (std::size_t at = 0; at < order.size(); ++at) {
+        const Vec3 here = place[at];
+        contacts.for_each_partner(order[at], [&](std::int64_t partner) {
+          if (!is_member(partner)) return;
+          const int* known = index.find(partner);
+          const Vec3 there = known ? place[*known] : mass_of(partner).position;
+          const Vec3 shift = tied ? to_image_of(off.pose.turned_to_world(there - here)) : Vec3(Vec3::Zero());
+          if (known) {
+            for (int d = 0; d < 3; ++d) off.spans[d] = off.spans[d] || shift[d] != 0;
+            return;
+          }
+          index[partner] = static_cast<int>(order.size());
+          place.emplace_back(there + off.pose.turned_to_frame(shift));
+          order.push_back(partner);
+        });
+      }
+      for (std::size_t at = 0; at < order.size(); ++at) {
+        const GranuleMass g = mass_of(order[at]);
+        off.mass.add(g.mass, place[at], g.radius, 1, g.held);
+        if (int* member = member_.find(narrow_tag(order[at]))) *member = fresh;
+        moved(order[at], fresh, place[at]);
+      }
+      off.summed = off.mass.count;
+      if (was_grounded) stand_still(off);
+      off.grounded = was_grounded && off.mass.held > 0;
+      rest.grounded = was_grounded && rest.mass.held > 0;
+      const double share = std::min(1.0, grounded_mass / whole);
+      off.grounded_mass = off.grounded ? share * off.mass.mass : 0.0;
+      rest.grounded_mass = rest.grounded ? share * rest.mass.mass : 0.0;
+      split_parents_.push_back(body);
+    }
+    for (const std::int64_t tag : tags) {
+      const int left = body_of(tag);
+      const SolidBody& b = bodies_.at(left);
+      if (2 * b.mass.count < b.summed) sum_anew(left, tag, contacts, mass_of);
+    }
+  }
+}
+
+std::vector<std::pair<int, int>> SolidBodies::take_merges() { return std::exchange(merges_, {}); }
+
+}  // namespace solidcull

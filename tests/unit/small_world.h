@@ -1,0 +1,353 @@
+// A small world in memory that implements the ports of culling/ports.h: spheres, springs, walls, a velocity-Verlet integrator. On
+// one rank, or on several in one process, one thread each. SI units; world frame. No engine, no MPI.
+#pragma once
+
+#include <array>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "culling.h"
+#include "per_granule.h"
+#include "ports.h"
+
+namespace solidcull {
+
+class SmallWorld;
+
+/// Where ranks meet. A rank that waits for one that does not come, or that has called something else, gets an exception: a
+/// deadlock is a failed test, no test that hangs.
+class Meeting {
+ public:
+  explicit Meeting(int ranks, double seconds = 20) : slots_(static_cast<std::size_t>(ranks)), seconds_(seconds) {}
+
+  /// The bytes of all ranks, once all have come with the same `what`. Collective.
+  std::vector<std::vector<char>> gather(int rank, const std::string& what, const void* bytes, std::size_t n);
+  /// The rank comes no more.
+  void leave(int rank);
+
+  /// Another rank ended or failed, or did not come.
+  struct Broken : std::runtime_error {
+    using std::runtime_error::runtime_error;
+  };
+
+ private:
+  struct Slot {
+    std::string what;
+    std::vector<char> bytes;
+  };
+  void wait(int rank, std::unique_lock<std::mutex>& lock);
+
+  std::mutex mutex_;
+  std::condition_variable all_came_;
+  std::vector<Slot> slots_;
+  const double seconds_;
+  std::size_t came_ = 0;
+  std::uint64_t round_ = 0;
+  std::string broken_, gone_;
+};
+
+/// What a deck sets, alike on all ranks.
+struct SmallDeck {
+  Box box{Vec3::Constant(-1), Vec3::Constant(1)};
+  std::array<bool, 3> periodic{};
+  std::array<int, 3> split{1, 1, 1};  ///< ranks along x, y, z
+  double skin = 1e-3, dt = 1e-4;
+  Vec3 gravity = Vec3(0, 0, -9.81);
+  double density = 2500;
+  double stiffness = 1000, damping = 0.5, friction = 0.5;  ///< N/m, N s/m, -
+  double shear_stiffness = 500;                            ///< of the spring in the contact history (N/m)
+
+  struct Plane {
+    std::string name;
+    Vec3 point, normal;  ///< granules are where the normal points
+    bool moving = false;
+    Vec3 velocity = Vec3::Zero();
+  };
+  struct Mesh {
+    std::string name;
+    std::vector<std::array<Vec3, 3>> triangles;
+    bool moving = false;
+    bool reports_load = true;
+    Vec3 reference = Vec3::Zero();  ///< torques are about it
+  };
+  struct Source {
+    Box box;
+    std::int64_t next = -1;  ///< step at which it inserts
+  };
+  std::vector<Plane> planes;
+  std::vector<Mesh> meshes;
+  std::vector<Source> sources;
+
+  /// Two triangles at this height, with edges of `size`.
+  static Mesh floor(double z, double size, const std::string& name = "floor");
+  static Plane ground(double z, const std::string& name = "ground") { return {name, Vec3(0, 0, z), Vec3(0, 0, 1)}; }
+};
+
+class SmallAtoms : public Atoms {
+ public:
+  static constexpr int all_bit = 1, interface_group = 2, held_group = 4;
+  using Histories = std::map<int, std::array<double, 3>>;  // by the partner's tag
+
+  explicit SmallAtoms(SmallWorld& world);
+  void pack(int i, std::vector<double>& record, int& layout) override;
+  std::vector<int> motion_words(int i, bool positions) override;
+  void take_out(int i) override;
+  int put_back(const std::vector<double>& record, int layout) override;
+  void wrap(int i) override;
+  int layouts() const override { return static_cast<int>(texts_.size()); }
+  std::string layout_text(int layout) const override { return texts_.at(static_cast<std::size_t>(layout)); }
+  int layout_from_text(const std::string& text) override;
+  void publish_counts(std::int64_t returned) override;
+  void sort_soon() override { sort_asked = true; }
+
+  int find(int tag) const;  ///< owned; -1: none
+  int append();             ///< a new owned atom, all zero
+  void drop_ghosts() { ghosts = 0; }
+  int append_ghost();
+  void swap(int i, int j);  ///< owned ones; followers follow
+  void fit(int new_room);
+  Histories& histories(int i) { return histories_[static_cast<std::size_t>(i)]; }
+
+  std::vector<double> colour;  ///< a column that the culling knows nothing of
+  std::int64_t published = -1, returned_last = 0;
+  bool sort_asked = false;
+  std::vector<FollowsAtoms*> followers;
+
+ private:
+  void grow(int new_room);
+  void renew();
+  void copy(int from, int to);
+
+  SmallWorld& world_;
+  std::vector<double> x_, v_, omega_, f_, torque_, radius_, mass_;
+  std::vector<int> tag_, type_, groups_;
+  std::vector<Histories> histories_;
+  std::vector<std::string> texts_;
+};
+
+/// A linear spring and dashpot along the normal; along the surface a spring whose length is the contact's history, held by
+/// Coulomb's friction.
+class SmallContacts : public Contacts {
+ public:
+  explicit SmallContacts(SmallWorld& world) : world_(world) {}
+  NeighbourRows neighbours() const override;
+  HistoryRows histories() const override;
+  std::vector<bool> flips() const override { return std::vector<bool>(static_cast<std::size_t>(width), true); }
+  std::vector<int> vectors() const override { return width ? std::vector<int>{0} : std::vector<int>{}; }
+  void bring_histories_up_to_date() override { ++brought_up_to_date; }
+  void give_histories(int i, const History* contacts, std::size_t n) override;
+  void clear_histories(int i) override;
+  Vec3 force_on_first(int i, int k) override;
+  Vec3 force_on_first(int i, int j, const double* history) override;
+  void leave_out_pairs_within(const std::vector<int>& body_of_atom) override;
+
+  void build();                           ///< rows by brute force
+  void add_forces();                      ///< and histories go on by a time step
+  bool listed(int tag, int other) const;  ///< either way
+  void rows_are_invalid() { valid_ = false; }
+
+  int width = 3;
+  int brought_up_to_date = 0;
+
+ private:
+  static constexpr int mask_ = 0x3fffffff, mark_ = 0x40000000;  // bits above the mask belong to the engine
+  Vec3 force(int i, int j, const Vec3& spring, Vec3* sheared, double dt) const;
+
+  SmallWorld& world_;
+  bool valid_ = false;
+  std::vector<std::vector<int>> partners_;
+  std::vector<int> row_, count_;
+  std::vector<const int*> first_;
+  mutable std::vector<int> history_count_;
+  mutable std::vector<std::vector<int>> history_partner_;
+  mutable std::vector<std::vector<double>> history_numbers_;
+  mutable std::vector<const int*> partner_rows_;
+  mutable std::vector<const double*> number_rows_;
+};
+
+class SmallWalls : public Walls {
+ public:
+  explicit SmallWalls(SmallWorld& world) : world_(world) {}
+  std::vector<WallContact> contacts() const override;
+  std::vector<WallTriangle> triangles() const override;
+  bool near(const WallTriangle& t, const Sphere& s, double gap) const override;
+  bool primitive_near(const Sphere& s, double gap) const override;
+  std::vector<std::string> names() const override;
+  std::vector<WallLoad> loads_on(std::int64_t tag) override;
+  void press(int mesh, int element, const Vec3& force, const Vec3& torque) override;
+
+  void begin_step();
+  void add_forces();
+  void move();  ///< moving planes, over a time step
+  struct Borne {
+    Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  ///< of the step
+    Vec3 pressed = Vec3::Zero();                       ///< the part of the force that came by press()
+  };
+  std::map<std::pair<int, int>, Borne> borne;  ///< by mesh and element
+  Vec3 borne_by_meshes() const;
+
+ private:
+  struct Touch {
+    int granule;
+    Vec3 to_wall;
+    double gap;
+    int plane, mesh, element;  // -1: not one
+    bool moving;
+  };
+  std::vector<Touch> find(double gap) const;
+
+  SmallWorld& world_;
+  std::vector<std::pair<std::int64_t, WallLoad>> seen_;
+};
+
+class SmallInsertions : public Insertions {
+ public:
+  explicit SmallInsertions(SmallWorld& world) : world_(world) {}
+  bool any() const override;
+  bool any_due(std::int64_t step) const override;
+  std::vector<Box> boxes(bool soon, double margin) const override;
+  bool has_inserted() const override { return inserted; }
+  bool inserted = false;
+
+ private:
+  SmallWorld& world_;
+};
+
+class SmallRanks : public Ranks {
+ public:
+  SmallRanks(SmallWorld& world, Meeting* meeting, int rank, int ranks);
+  bool any(bool here) const override;
+  void sum(double* numbers, int n) const override;
+  void sum(std::int64_t* numbers, int n) const override;
+  void largest(double* numbers, int n) const override;
+  void largest(std::int64_t* numbers, int n) const override;
+  bool has_neighbours() const override;
+  void update() override;
+  bool subdomain_changed() const override;
+  bool owns(const Vec3& place) const override;
+  const std::vector<Vec3>& image_shifts() const override { return shifts_; }
+
+  /// Rows of all ranks, by rank. Collective.
+  std::vector<std::vector<char>> all(const std::string& what, const void* bytes, std::size_t n) const;
+  mutable int collectives = 0;  ///< so many so far
+
+ protected:
+  void exchange_bytes(const void* rows, std::size_t n, std::size_t bytes, double width, const Room& room) const override;
+  void gather_bytes(const void* rows, std::size_t n, std::size_t bytes, bool everywhere, const Room& room) const override;
+
+ private:
+  template <class Number, class Unite>
+  void unite(const char* what, Number* numbers, int n, Unite unite) const;
+
+  SmallWorld& world_;
+  Meeting* meeting_;
+  std::vector<Vec3> shifts_{Vec3::Zero()};
+  Box known_;
+};
+
+class SmallRun : public Run {
+ public:
+  explicit SmallRun(SmallWorld& world) : world_(world) {}
+  Vec3 gravity() const override;
+  Vec3 wrapped(const Vec3& place) const override;
+  bool ask_for_reneighbouring(std::int64_t step) override;
+  void say(const std::string& line) const override;
+
+  std::int64_t asked = -1;
+  mutable std::vector<std::string> said;
+
+ private:
+  SmallWorld& world_;
+};
+
+class SmallMemory : public Memory {
+ public:
+  explicit SmallMemory(SmallWorld& world) : world_(world) {}
+  void freed(std::size_t bytes) override { bytes_freed += bytes; }
+  bool too_large() const override { return large; }
+  void fit() override;
+  void fit_bins(bool some_stored) override { bins_wide = some_stored; }
+  void give_bins_back() override { bins_wide = false; }
+
+  std::size_t bytes_freed = 0;
+  bool large = false, bins_wide = false;
+  int fits = 0;
+
+ private:
+  SmallWorld& world_;
+};
+
+class SmallWorld {
+ public:
+  explicit SmallWorld(const SmallDeck& deck, Meeting* meeting = nullptr, int rank = 0, int ranks = 1);
+  SmallWorld(const SmallWorld&) = delete;
+
+  SmallDeck deck;
+  SmallAtoms atoms;
+  SmallContacts contacts;
+  SmallWalls walls;
+  SmallInsertions insertions;
+  SmallRanks ranks;
+  SmallRun run;
+  SmallMemory memory;
+
+  Ports ports() { return {atoms, contacts, walls, insertions, ranks, run, memory}; }
+
+  /// A granule, on the rank that owns its place; -1 elsewhere.
+  int add(int tag, const Vec3& place, double radius, const Vec3& velocity = Vec3::Zero(), const Vec3& spin = Vec3::Zero());
+  int at(int tag) const { return atoms.find(tag); }
+  double mass_of(double radius) const;
+  /// What the engine does at a reneighbouring, but for its fixes: wrap, exchange, ghosts, lists. Collective.
+  void reneighbour() {
+    exchange();
+    borders();
+    contacts.build();
+  }
+  void exchange();
+  void borders();
+  void compute_forces();
+  /// Called with the index of each granule that another rank has sent.
+  std::function<void(int)> on_arrival;
+
+  // --- with the culling's hooks, in the order of ARCHITECTURE.md's table. Collective.
+  void follow(Culling& culling);
+  void begin_run(Culling* culling);
+  void step(Culling* culling);
+  void steps(Culling* culling, int n) {
+    for (; n > 0; --n) step(culling);
+  }
+  int builds = 0;  ///< neighbour lists built so far
+
+  Vec3 momentum() const;          ///< of this rank's atoms
+  double kinetic_energy() const;  ///< likewise
+  Box subdomain(int rank) const;
+
+ private:
+  struct Ghost {
+    int rank, index;
+    Vec3 shift;
+  };
+  struct Row;
+  std::vector<Row> owned_rows() const;
+  void take_row(int i, const Row& row, const Vec3& shift);
+  void refresh_ghosts();
+  bool moved_too_far();
+  void integrate_first_half();
+  void integrate_second_half();
+  void kick(int i);
+
+  std::vector<Ghost> ghosts_;
+  std::vector<Vec3> built_at_;
+};
+
+/// One thread for each rank. The first exception of a rank is thrown again here, those that follow from it are not.
+void run_on_ranks(const SmallDeck& deck, const std::function<void(SmallWorld&)>& work, double seconds = 20);
+
+}  // namespace solidcull

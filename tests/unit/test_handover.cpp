@@ -1,0 +1,290 @@
+#include <gtest/gtest.h>
+
+#include <map>
+#include <mutex>
+#include <set>
+
+#include "input_error.h"
+#include "world_parts.h"
+
+namespace solidcull {
+namespace {
+
+constexpr double r = 0.005;  // m
+constexpr double apart = 0.998 * 2 * r;
+
+SmallDeck ranks_along_x(int ranks) {
+  SmallDeck deck;
+  deck.gravity = Vec3::Zero();
+  deck.box = {Vec3(-0.12, -0.1, -0.1), Vec3(0.12, 0.1, 0.1)};
+  deck.split = {ranks, 1, 1};
+  return deck;
+}
+
+/// What all ranks hold together.
+struct Whole {
+  std::mutex mutex;
+  int interior = 0, interface_granules = 0;
+  double mass = 0, colour = 0;
+  Vec3 momentum = Vec3::Zero(), turning = Vec3::Zero();
+  std::map<int, Vec3> places;                                      // by tag
+  std::map<std::pair<std::int64_t, std::int64_t>, Vec3> contacts;  // as the lower tag sees it, world frame
+  std::set<int> keys;                                              // of bodies
+  std::vector<int> tags_by_rank[4];
+
+  void add(SmallWorld& w, WorldParts& parts) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    const SolidBodies& bodies = parts.solid.bodies();
+    const auto one = [&](int tag, double m, double radius, const Vec3& x, int body) {
+      const Twist& twist = bodies.body(body).twist;
+      const RigidPart p = RigidPart::granule(m, radius, x, twist.at(x), twist.spin);
+      mass += m;
+      momentum += m * p.velocity;
+      turning += p.angular_momentum(Vec3::Zero());
+      EXPECT_TRUE(places.emplace(tag, x).second) << "two ranks hold granule " << tag;
+      tags_by_rank[w.ranks.me].push_back(tag);
+    };
+    for (int i = 0; i < w.atoms.owned; ++i) {
+      if (!parts.shell[i].in_body()) continue;
+      ++interface_granules;
+      const int body = parts.shell[i].body;
+      EXPECT_EQ(body, bodies.body_of(w.atoms.tag[i]));
+      const Vec3 x = bodies.pose(body).to_world(parts.shell[i].place);
+      EXPECT_LT((x - w.atoms.place(i)).norm(), 1e-12);
+      one(w.atoms.tag[i], w.atoms.mass[i], w.atoms.radius[i], x, body);
+    }
+    parts.solid.store().for_each([&](const Resident& g) {
+      ++interior;
+      one(static_cast<int>(g.tag), parts.solid.store().get(g.tag).mass, g.radius, parts.solid.in_world(g), g.body);
+      std::vector<double> record;
+      parts.solid.store().record(g.tag, record);
+      colour += record.back();
+    });
+    parts.solid.contacts().for_each_contact([&](std::int64_t low, std::int64_t high, const double* h) {
+      const int body = bodies.body_of(low) ? bodies.body_of(low) : bodies.body_of(high);
+      const Vec3 history = h ? Vec3(bodies.pose(body).turn() * vec(h)) : Vec3(Vec3::Zero());
+      const auto known = contacts.emplace(std::make_pair(low, high), history);
+      EXPECT_LT((known.first->second - history).norm(), 1e-15);  // on both sides of a border
+    });
+    for (const auto& b : bodies.bodies()) keys.insert(parts.groups.key_of(b.first));
+  }
+};
+
+void expect_alike(const Whole& a, const Whole& b) {
+  EXPECT_EQ(a.interior, b.interior);
+  EXPECT_EQ(a.interface_granules, b.interface_granules);
+  EXPECT_NEAR(a.mass, b.mass, 1e-12 * b.mass);
+  EXPECT_NEAR(a.colour, b.colour, 1e-9);
+  EXPECT_LT((a.momentum - b.momentum).norm(), 1e-9 * b.momentum.norm());
+  EXPECT_LT((a.turning - b.turning).norm(), 1e-9 * b.turning.norm());
+  EXPECT_EQ(a.keys.size(), b.keys.size());
+  ASSERT_EQ(a.places.size(), b.places.size());
+  for (const auto& [tag, x] : b.places) EXPECT_LT((a.places.at(tag) - x).norm(), 1e-12) << tag;
+  ASSERT_EQ(a.contacts.size(), b.contacts.size());
+  for (const auto& [pair, h] : b.contacts)
+    EXPECT_LT((a.contacts.at(pair) - h).norm(), 1e-12 * h.norm()) << pair.first << ' ' << pair.second;
+}
+
+/// A block of 6 x 2 x 2 granules from x on, one body that moves and turns; the inner ones are stored.
+struct Block {
+  Block(SmallWorld& w, double from) : world(w), parts(w, sleeping_settings(), 2 * r) {
+    for (int n = 0; n < 24; ++n) {
+      const Vec3 x = Vec3(from, 0, 0) + apart * Vec3(n % 6, n / 6 % 2, n / 12);
+      world.add(n + 1, x, r, Vec3(0.1, 0, 1e-4 * n), Vec3(0, 0, 1e-2));
+      tags.push_back(n + 1);
+    }
+    world.begin_run(nullptr);
+    world.steps(nullptr, 10);
+    world.reneighbour();  // whoever has crossed a border by now does so as an exterior granule
+    parts.lock(tags);
+    parts.put_away({2, 3, 4, 5, 8, 9, 10, 11, 14, 15});
+    parts.reneighbour();
+  }
+  void shift(const Vec3& by) {
+    for (auto& [number, body] : parts.solid.bodies_in_motion()) {
+      body.shift(by);
+      body.take_twist();
+    }
+    parts.motion.is_stale();
+    parts.motion.refresh();
+    parts.motion.place();
+  }
+  SmallWorld& world;
+  WorldParts parts;
+  std::vector<std::int64_t> tags;
+};
+
+TEST(Handover, granules_go_to_the_rank_that_owns_their_place_and_nothing_is_lost) {
+  for (const int ranks : {2, 3}) {
+    Whole before, after;
+    run_on_ranks(ranks_along_x(ranks), [&](SmallWorld& w) {
+      Block block(w, -0.06);
+      block.shift(Vec3(0.031, 0, 0));
+      before.add(w, block.parts);
+      block.parts.index.index(w.atoms);
+      EXPECT_TRUE(block.parts.handover.send_home());
+      block.parts.reneighbour();
+      after.add(w, block.parts);
+      block.parts.census.count_bodies();
+      EXPECT_NO_THROW(block.parts.invariants.check());
+      block.parts.index.index(w.atoms);
+      EXPECT_FALSE(block.parts.handover.send_home());  // all are at home
+    });
+    EXPECT_EQ(before.interior, 10);
+    EXPECT_EQ(before.interface_granules, 14);
+    EXPECT_GE(before.contacts.size(), 40u);
+    expect_alike(after, before);
+    EXPECT_EQ(after.keys.size(), 1u);
+    // each where its place is: columns of the block at -0.029 + 0.01 n
+    const double border = ranks == 2 ? 0.0 : -0.04;
+    for (const int tag : after.tags_by_rank[0]) EXPECT_LT(after.places[tag][0], border);
+    for (const int tag : after.tags_by_rank[1]) EXPECT_GE(after.places[tag][0], border);
+    EXPECT_FALSE(after.tags_by_rank[1].empty());
+  }
+}
+
+TEST(Handover, what_lags_behind_by_less_than_the_slack_may_wait) {
+  run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
+    Block block(w, -0.065);  // its last column at -0.0151
+    block.parts.index.index(w.atoms);
+    block.parts.handover.send_home();
+    block.parts.reneighbour();
+    block.shift(Vec3(0.3 * 2 * r, 0, 0));
+    block.parts.index.index(w.atoms);
+    EXPECT_FALSE(block.parts.handover.send_home());
+  });
+}
+
+TEST(Handover, an_interface_granule_that_was_announced_and_does_not_come_is_an_internal_error) {
+  run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
+    Block block(w, -0.06);
+    block.shift(Vec3(0.031, 0, 0));
+    block.parts.index.index(w.atoms);
+    block.parts.handover.send_home();
+    // the engine's exchange brings nothing
+    if (w.ranks.me == 0) return;
+    EXPECT_THROW(block.parts.handover.take_over(), InternalError);
+  });
+}
+
+TEST(Handover, an_interface_granule_that_comes_without_its_body_is_an_internal_error) {
+  run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
+    Block block(w, -0.06);
+    block.shift(Vec3(0.031, 0, 0));
+    w.exchange();  // nobody has announced them
+    if (w.ranks.me == 0) return;
+    EXPECT_THROW(block.parts.handover.take_over(), InternalError);
+  });
+}
+
+// ------------------------------------------------------------------------------------------------------------ snapshot
+
+/// The engine's side of a restart file: atoms, with what follows them.
+struct File {
+  std::mutex mutex;
+  struct Atom {
+    std::vector<double> record;
+    std::vector<std::vector<double>> followers;
+  };
+  std::vector<Atom> atoms;
+  std::vector<double> state;
+
+  void write(SmallWorld& w, WorldParts& parts) {
+    const std::vector<double> numbers = parts.snapshot.write();
+    EXPECT_EQ(numbers.empty(), w.ranks.me != 0);
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (!numbers.empty()) state = numbers;
+    for (int i = 0; i < w.atoms.owned; ++i) {
+      Atom a;
+      int layout = 0;
+      w.atoms.pack(i, a.record, layout);
+      for (FollowsAtoms* f : w.atoms.followers) {
+        a.followers.emplace_back(static_cast<std::size_t>(f->packed_size()));
+        f->pack(i, a.followers.back().data());
+      }
+      atoms.push_back(a);
+    }
+  }
+  void read(SmallWorld& w, WorldParts& parts) const {
+    for (const Atom& a : atoms) {
+      if (!w.ranks.owns(vec(a.record.data()))) continue;
+      const int i = w.atoms.put_back(a.record, 0);
+      for (std::size_t f = 0; f < a.followers.size(); ++f) w.atoms.followers[f]->unpack(i, a.followers[f].data());
+    }
+    parts.snapshot.read(state.data());
+    EXPECT_TRUE(parts.snapshot.waits());
+    parts.snapshot.take_up();
+    EXPECT_FALSE(parts.snapshot.waits());
+  }
+};
+
+TEST(Snapshot, what_two_ranks_wrote_is_taken_up_by_any_number_of_ranks) {
+  File file;
+  Whole written;
+  run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
+    Block block(w, -0.03);
+    block.parts.solid.count_carves(3);
+    written.add(w, block.parts);
+    file.write(w, block.parts);
+  });
+  ASSERT_EQ(written.interior, 10);
+  for (const int ranks : {1, 2, 3}) {
+    Whole read;
+    run_on_ranks(ranks_along_x(ranks), [&](SmallWorld& w) {
+      WorldParts parts(w, sleeping_settings(), 1.0);  // the scales are the file's
+      file.read(w, parts);
+      EXPECT_EQ(parts.scales.diameter(), 2 * r);
+      parts.reneighbour();
+      read.add(w, parts);
+      EXPECT_NO_THROW(parts.invariants.check());
+      std::int64_t counters[2] = {parts.solid.ledger().granules_locked(), parts.solid.ledger().granules_restored()};
+      w.ranks.sum(counters, 2);
+      EXPECT_EQ(counters[0], 24);
+      EXPECT_EQ(counters[1], 0);
+      EXPECT_EQ(parts.solid.ledger().carves(), 3);
+      EXPECT_EQ(parts.solid.largest_radius_by_type()[1], r);
+    });
+    expect_alike(read, written);
+  }
+}
+
+TEST(Snapshot, on_as_many_ranks_everything_is_as_it_was_to_the_last_bit) {
+  for (const int ranks : {1, 2}) {
+    File first, second;
+    run_on_ranks(ranks_along_x(ranks), [&](SmallWorld& w) {
+      Block block(w, -0.03);
+      for (auto& [number, body] : block.parts.solid.bodies_in_motion())
+        for (int n = 0; n < 10; ++n) body.drift(1e-4);  // frames are turned
+      block.shift(Vec3::Zero());
+      first.write(w, block.parts);
+    });
+    run_on_ranks(ranks_along_x(ranks), [&](SmallWorld& w) {
+      WorldParts parts(w, sleeping_settings(), 2 * r);
+      first.read(w, parts);
+      second.write(w, parts);
+    });
+    ASSERT_EQ(first.state.size(), second.state.size());
+    std::size_t different = 0;
+    for (std::size_t k = 0; k < first.state.size(); ++k) different += first.state[k] != second.state[k];
+    EXPECT_EQ(different, 0u) << ranks;
+  }
+}
+
+TEST(Snapshot, the_users_faults_are_named) {
+  File file;
+  run_on_ranks(ranks_along_x(1), [&](SmallWorld& w) {
+    Block block(w, -0.03);
+    file.write(w, block.parts);
+  });
+  SmallWorld world(ranks_along_x(1));
+  WorldParts parts(world, sleeping_settings(), 2 * r);
+  parts.snapshot.read(file.state.data());
+  world.contacts.width = 0;  // another contact model
+  parts.solid.set_histories(world.contacts.flips(), world.contacts.vectors());
+  EXPECT_THROW(parts.snapshot.take_up(), InputError);
+  file.state[1] += 1;  // another version
+  EXPECT_THROW(parts.snapshot.read(file.state.data()), InputError);
+}
+
+}  // namespace
+}  // namespace solidcull

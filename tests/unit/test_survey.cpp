@@ -1,0 +1,364 @@
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "world_parts.h"
+
+namespace solidcull {
+namespace {
+
+constexpr double r = 0.005;  // m
+constexpr int looks_to_calm = 4;
+
+/// Granules in a row, and looks at them 16 steps apart. Forces are what a test says they are.
+struct Bed {
+  explicit Bed(const Settings& settings = sleeping_settings(), const SmallDeck& deck = SmallDeck())
+      : world(deck), parts(world, settings, 2 * r) {
+    every = parts.scales.look_every();
+    speed = parts.scales.solid_state().speed;
+  }
+  /// The weight of one granule (N).
+  double weight() const { return 9.81 * world.mass_of(r); }
+  /// n granules along x, from this place on; neighbours press on each other with so many weights. Returns where the row ends.
+  Vec3 row(int first_tag, int n, const Vec3& from, double weights = 5) {
+    const Vec3 step(2 * r - weights * weight() / world.deck.stiffness, 0, 0);
+    for (int k = 0; k < n; ++k) world.add(first_tag + k, from + k * step, r);
+    return from + n * step;
+  }
+  void begin() {
+    world.reneighbour();
+    parts.walls.update(world.walls.contacts(), false);
+    for (int i = 0; i < world.atoms.owned; ++i) world.atoms.clear_load(i);
+  }
+  /// Returns how many have been calm for long enough.
+  std::int64_t look(const Patience& patience = {false, looks_to_calm, 1}) {
+    proposal = Proposal();
+    parts.motion.refresh();
+    const std::int64_t candidates = parts.survey.find_calm(patience, proposal);
+    parts.survey.leave_out_unsteady(patience, proposal);
+    parts.survey.choose_asleep(patience, proposal);
+    world.run.step += every;
+    return candidates;
+  }
+  std::set<std::int64_t> chosen() const { return std::set<std::int64_t>(proposal.chosen.begin(), proposal.chosen.end()); }
+  int calm(int tag) { return parts.survey[world.at(tag)].calm; }
+  void set_velocity(int tag, const Vec3& v) { world.atoms.set_velocity(world.at(tag), v); }
+
+  SmallWorld world;
+  WorldParts parts;
+  Proposal proposal;
+  int every;
+  double speed;
+};
+
+using Tags = std::set<std::int64_t>;
+
+TEST(Survey, a_granule_at_rest_is_chosen_when_it_has_been_calm_for_so_many_looks) {
+  Bed bed;
+  bed.row(1, 3, Vec3::Zero());
+  bed.begin();
+  for (int n = 1; n < looks_to_calm; ++n) {
+    EXPECT_EQ(bed.look(), 0) << n;
+    EXPECT_TRUE(bed.chosen().empty()) << n;
+  }
+  EXPECT_EQ(bed.look(), 3);
+  EXPECT_EQ(bed.chosen(), (Tags{1, 2, 3}));
+}
+
+TEST(Survey, motion_against_a_neighbour_starts_the_count_anew) {
+  Bed bed;
+  bed.row(1, 4, Vec3::Zero());
+  bed.begin();
+  bed.look();
+  bed.look();
+  bed.set_velocity(4, Vec3(0, 1.1 * bed.speed, 0));
+  bed.look();
+  EXPECT_EQ(bed.calm(4), 0);
+  EXPECT_EQ(bed.calm(3), 0);  // its neighbour sees the same
+  EXPECT_EQ(bed.calm(2), 3);
+  bed.set_velocity(4, Vec3(0, 0.9 * bed.speed, 0));
+  bed.look();
+  EXPECT_EQ(bed.calm(4), 1);
+  EXPECT_EQ(bed.calm(2), 4);
+}
+
+TEST(Survey, surfaces_that_slide_are_no_rest_but_wheels_that_roll_on_each_other_are) {
+  Bed slides, rolls;
+  for (Bed* bed : {&slides, &rolls}) {
+    bed->row(1, 2, Vec3::Zero());
+    bed->begin();
+    const Vec3 spin(0, 0, 2 * bed->speed / r);
+    bed->world.atoms.set_spin(0, spin);
+    bed->world.atoms.set_spin(1, bed == &slides ? spin : Vec3(-spin));
+    for (int n = 0; n < looks_to_calm; ++n) bed->look();
+  }
+  EXPECT_TRUE(slides.chosen().empty());
+  EXPECT_EQ(rolls.chosen(), (Tags{1, 2}));
+}
+
+TEST(Survey, a_granule_that_touches_nothing_is_no_solid) {
+  Bed bed;
+  bed.world.add(1, Vec3::Zero(), r);
+  bed.world.add(2, Vec3(2.05 * r, 0, 0), r);  // within the skin, but not touching
+  bed.begin();
+  for (int n = 0; n < 3 * looks_to_calm; ++n) EXPECT_EQ(bed.look(), 0);
+}
+
+TEST(Survey, a_granule_out_of_balance_is_no_solid) {
+  Bed bed;
+  bed.row(1, 3, Vec3::Zero());
+  bed.begin();
+  // a quarter of the wake-up tolerance of three weights
+  set(bed.world.atoms.f + 3 * bed.world.at(3), Vec3(0, 0, 0.8 * bed.weight()));
+  for (int n = 0; n < looks_to_calm; ++n) bed.look();
+  EXPECT_EQ(bed.calm(3), 0);
+  EXPECT_EQ(bed.calm(1), looks_to_calm);
+}
+
+TEST(Survey, what_something_holds_or_nothing_moves_is_never_chosen) {
+  Bed bed;
+  bed.row(1, 4, Vec3::Zero());
+  bed.begin();
+  bed.world.atoms.groups[bed.world.at(1)] |= SmallAtoms::held_group;
+  bed.world.atoms.groups[bed.world.at(4)] = 0;
+  for (int n = 0; n < looks_to_calm; ++n) bed.look();
+  EXPECT_EQ(bed.chosen(), (Tags{2, 3}));
+}
+
+// ------------------------------------------------------------------------------------------------------------ frames
+
+TEST(Survey, a_mass_that_falls_freely_is_solid) {
+  Bed bed;
+  bed.row(1, 3, Vec3::Zero());
+  bed.begin();
+  const Vec3 g = bed.world.deck.gravity;
+  Vec3 v(1, 0, 0);
+  for (int n = 0; n < looks_to_calm; ++n) {
+    for (int i = 0; i < 3; ++i) {
+      bed.world.atoms.set_velocity(i, v);
+      set(bed.world.atoms.f + 3 * i, bed.world.atoms.mass[i] * g);
+    }
+    bed.look();
+    v += bed.every * bed.world.run.dt * g;
+  }
+  EXPECT_EQ(bed.chosen(), (Tags{1, 2, 3}));
+  EXPECT_GT(v.norm(), 100 * bed.speed);
+}
+
+TEST(Survey, a_mass_that_turns_as_one_is_solid) {
+  Bed bed;
+  bed.row(1, 5, Vec3::Zero());
+  bed.begin();
+  const Vec3 spin(0, 0, 2);  // rad/s
+  const double angle = spin[2] * bed.every * bed.world.run.dt;
+  std::vector<Vec3> x;
+  for (int i = 0; i < 5; ++i) x.push_back(bed.world.atoms.place(i));
+  for (int n = 0; n < looks_to_calm; ++n) {
+    for (int i = 0; i < 5; ++i) {
+      const Vec3 at = rotation(Vec3(0, 0, n * angle)) * x[static_cast<std::size_t>(i)];
+      bed.world.atoms.set_place(i, at);
+      bed.world.atoms.set_velocity(i, spin.cross(at));
+      bed.world.atoms.set_spin(i, spin);
+      set(bed.world.atoms.f + 3 * i, bed.world.atoms.mass[i] * spin.cross(spin.cross(at)));
+    }
+    bed.look();
+  }
+  EXPECT_EQ(bed.chosen(), (Tags{1, 2, 3, 4, 5}));
+  EXPECT_GT(bed.world.atoms.velocity(4).norm(), 20 * bed.speed);  // yet each one moves
+}
+
+TEST(Survey, a_mass_that_is_struck_as_a_whole_begins_anew) {
+  Bed bed;
+  bed.row(1, 3, Vec3::Zero());
+  bed.begin();
+  bed.look();
+  bed.look();
+  for (int i = 0; i < 3; ++i) bed.world.atoms.set_velocity(i, Vec3(0, 0, 2 * bed.speed));
+  bed.look();
+  EXPECT_EQ(bed.calm(2), 1);
+}
+
+TEST(Survey, with_fixed_bodies_only_what_rests_in_the_world_is_solid) {
+  Settings settings = sleeping_settings();
+  settings.motion = Motion::fixed;
+  Bed bed(settings);
+  bed.row(1, 3, Vec3::Zero());
+  bed.begin();
+  for (int i = 0; i < 3; ++i) bed.world.atoms.set_velocity(i, Vec3(0, 0, 1.1 * bed.speed));
+  for (int n = 0; n < looks_to_calm; ++n) EXPECT_EQ(bed.look(), 0);
+  for (int i = 0; i < 3; ++i) bed.world.atoms.set_velocity(i, Vec3(0, 0, 0.9 * bed.speed));
+  for (int n = 0; n < looks_to_calm; ++n) bed.look();
+  EXPECT_EQ(bed.chosen(), (Tags{1, 2, 3}));
+}
+
+// ------------------------------------------------------------------------------------------------------------ walls
+
+struct OnGround : Bed {
+  OnGround() : Bed(sleeping_settings(), deck()) {
+    world.add(1, Vec3(0, 0, r - weight() / world.deck.stiffness), r);
+    begin();
+  }
+  static SmallDeck deck() {
+    SmallDeck d;
+    d.planes = {SmallDeck::ground(0)};
+    return d;
+  }
+};
+
+TEST(Survey, a_granule_alone_on_a_wall_that_stands_still_is_solid_unless_it_slides_there) {
+  OnGround rests, slides;
+  slides.set_velocity(1, Vec3(1.1 * slides.speed, 0, 0));
+  // pressed by its weight alone it must be calm for longer: (3 weights / 1)^(1/2) times
+  for (int n = 1; n <= 7; ++n) {
+    for (OnGround* bed : {&rests, &slides}) {
+      bed->parts.walls.update(bed->world.walls.contacts(), false);
+      bed->look();
+    }
+    EXPECT_EQ(rests.chosen().size(), n == 7 ? 1u : 0u) << n;
+    EXPECT_EQ(slides.calm(1), 0);
+  }
+}
+
+// ------------------------------------------------------------------------------------------------------------ loads
+
+TEST(Survey, who_is_hardly_pressed_must_be_calm_for_longer) {
+  Bed bed;
+  bed.row(1, 2, Vec3::Zero(), 5.0);             // 5 weights: confined
+  bed.row(3, 2, Vec3(0, 0.05, 0), 3.0 / 1.96);  // (3 / 1.53)^(1/2) = 1.4 times as long: 5.6 looks
+  bed.row(5, 2, Vec3(0, 0.1, 0), 0.1);          // twice at most
+  bed.begin();
+  std::map<std::int64_t, int> first;
+  for (int n = 1; n <= 10; ++n) {
+    bed.look();
+    for (const std::int64_t tag : bed.chosen()) first.emplace(tag, n);
+  }
+  EXPECT_EQ(first, (std::map<std::int64_t, int>{{1, 4}, {2, 4}, {3, 6}, {4, 6}, {5, 8}, {6, 8}}));
+}
+
+TEST(Survey, quick_looks_do_not_ask_what_presses) {
+  Bed bed;
+  bed.row(1, 2, Vec3::Zero(), 0.1);
+  bed.begin();
+  const Patience quick{true, 3, 5};
+  bed.look(quick);
+  bed.look(quick);
+  EXPECT_TRUE(bed.chosen().empty());
+  bed.look(quick);
+  EXPECT_EQ(bed.chosen(), (Tags{1, 2}));
+}
+
+TEST(Survey, a_load_that_changes_from_look_to_look_is_no_solid_state) {
+  Bed bed;
+  bed.row(1, 2, Vec3::Zero(), 5.0);
+  bed.begin();
+  double weights = 5;
+  for (int n = 0; n < 3 * looks_to_calm; ++n) {
+    weights += 1;  // more than three quarters of a weight
+    bed.world.atoms.set_place(1, Vec3(2 * r - weights * bed.weight() / bed.world.deck.stiffness, 0, 0));
+    bed.look();
+    EXPECT_TRUE(bed.chosen().empty()) << n;
+  }
+  bed.look();
+  EXPECT_EQ(bed.chosen(), (Tags{1, 2}));  // it has been calm all the time
+}
+
+TEST(Survey, the_cover_around_what_moves_is_left_out) {
+  Settings settings = sleeping_settings();
+  settings.depth = 2;  // diameters
+  Bed bed(settings);
+  bed.row(1, 8, Vec3::Zero());
+  bed.begin();
+  for (int n = 0; n < looks_to_calm + 1; ++n) {
+    bed.set_velocity(8, Vec3(0, 0, 2 * bed.speed));
+    bed.look();
+  }
+  // 8 moves and 7 feels it; the gap from 7 to 4 is almost two diameters, to 3 almost three
+  EXPECT_EQ(bed.chosen(), (Tags{1, 2, 3}));
+}
+
+TEST(Survey, where_culling_waits_nobody_is_calm) {
+  Bed bed;
+  bed.row(1, 3, Vec3::Zero());
+  bed.begin();
+  for (int n = 0; n < looks_to_calm - 1; ++n) bed.look();
+  bed.parts.survey.forget_calm();
+  bed.look();
+  EXPECT_TRUE(bed.chosen().empty());
+  EXPECT_EQ(bed.calm(2), 1);
+}
+
+// ------------------------------------------------------------------------------------------------------------ ties
+
+TEST(Survey, ties_name_each_pair_that_touches_once_and_leave_out_a_granule_alone_among_exterior_ones) {
+  Bed bed;
+  bed.row(1, 3, Vec3::Zero());
+  bed.row(4, 3, Vec3(0, 0.05, 0));
+  bed.world.add(7, Vec3(0, 0.1, 0), r);  // touches nothing: on a wall, say
+  bed.begin();
+  bed.proposal.chosen = {1, 2, 5, 7};
+  bed.proposal.overdue_tags = {1, 5};
+  bed.parts.survey.tie(bed.proposal);
+  EXPECT_EQ(bed.chosen(), (Tags{1, 2, 7}));  // 4 and 6 stay exterior: 5 alone makes no solid
+  EXPECT_EQ(bed.proposal.overdue_tags, (std::vector<std::int64_t>{1}));
+  ASSERT_EQ(bed.proposal.touches.size(), 1u);
+  EXPECT_EQ(std::min(bed.proposal.touches[0].a, bed.proposal.touches[0].b), 1);
+  EXPECT_EQ(std::max(bed.proposal.touches[0].a, bed.proposal.touches[0].b), 2);
+}
+
+/// Two bodies of two granules each, which touch without being tied.
+struct TwoBodies : Bed {
+  TwoBodies() {
+    const double apart = 2 * r - 5 * weight() / world.deck.stiffness;
+    world.add(1, Vec3::Zero(), r);
+    world.add(2, Vec3(apart, 0, 0), r);
+    world.add(3, Vec3(0.05, 0, 0), r);
+    world.add(4, Vec3(0.05 + apart, 0, 0), r);
+    world.reneighbour();
+    world.compute_forces();
+    parts.lock({1, 2, 3, 4});
+    SolidBody& second = parts.solid.body(parts.body_of(3));
+    second.shift(Vec3(2 * apart - 0.05, 0, 0));
+    second.take_twist();
+    parts.motion.refresh();
+    parts.motion.place();
+    parts.reneighbour();
+    parts.motion.is_stale();
+  }
+};
+
+TEST(Survey, two_bodies_that_have_rested_against_each_other_are_joined) {
+  TwoBodies bed;
+  ASSERT_NE(bed.parts.body_of(1), bed.parts.body_of(3));
+  ASSERT_TRUE(bed.world.contacts.listed(2, 3));
+  ASSERT_FALSE(bed.world.contacts.listed(1, 2));
+  for (int n = 1; n < looks_to_calm; ++n) {
+    bed.look();
+    EXPECT_TRUE(bed.proposal.joins.empty()) << n;
+  }
+  bed.look();
+  ASSERT_EQ(bed.proposal.joins.size(), 1u);
+  EXPECT_EQ(bed.proposal.joins[0].a + bed.proposal.joins[0].b, 2 + 3);
+  bed.parts.change({}, bed.proposal);
+  EXPECT_EQ(bed.parts.body_of(1), bed.parts.body_of(4));
+  EXPECT_EQ(bed.parts.solid.bodies().size(), 1u);
+}
+
+TEST(Survey, two_bodies_that_slide_on_each_other_are_not) {
+  TwoBodies bed;
+  for (int n = 0; n < 2 * looks_to_calm; ++n) {
+    for (const int tag : {3, 4}) bed.set_velocity(tag, Vec3(0, 1.1 * bed.speed, 0));
+    bed.look();
+    EXPECT_TRUE(bed.proposal.joins.empty()) << n;
+  }
+}
+
+TEST(Survey, exterior_granules_are_counted_with_their_energy) {
+  TwoBodies bed;
+  const int i = bed.world.add(5, Vec3(0, 0.05, 0), r, Vec3(3, 0, 0));
+  EXPECT_EQ(bed.parts.survey.exterior_here(), 1);
+  EXPECT_DOUBLE_EQ(bed.parts.survey.kinetic_energy_of_exterior(), 4.5 * bed.world.atoms.mass[i]);
+}
+
+}  // namespace
+}  // namespace solidcull

@@ -1,0 +1,106 @@
+// All parts of the culling on one rank of a small world, each open to questions.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "body_changes.h"
+#include "culling_parts.h"
+#include "small_world.h"
+
+namespace solidcull {
+
+/// Settings of `exterior sleep` with no cover, as most tests of decisions want them: the surface costs more than the rest.
+inline Settings sleeping_settings() {
+  Settings s;
+  s.exterior = Exterior::sleep;
+  s.depth = 0;
+  return s;
+}
+
+struct WorldParts : CullingParts {
+  /// d: mean diameter of the granules (m).
+  WorldParts(SmallWorld& small_world, const Settings& settings, double d)
+      : CullingParts(small_world.ports(), settings, 1), world(small_world) {
+    world.atoms.followers = followers;
+    for (FollowsAtoms* f : followers) f->grow(world.atoms.room);
+    for (FollowsAtoms* f : followers)
+      for (int i = 0; i < world.atoms.owned; ++i) f->reset(i);
+    world.on_arrival = [this](int i) { shell.is_arriving(i); };
+    solid.set_histories(ports.contacts.flips(), ports.contacts.vectors());
+    Vec3 periods = world.run.edges();
+    for (int k = 0; k < 3; ++k)
+      if (!world.run.periodic[static_cast<std::size_t>(k)]) periods[k] = 0;
+    solid.set_periods(periods);
+    const double g = world.deck.gravity.norm();
+    scales.set(d, g > 0 ? g : Scales::standard_gravity);
+    scales.make_laws(world.run.dt);
+    solid.open_store();
+  }
+
+  /// One membership change as Culling makes it, but for what goes to the store and comes out by the shell's closure. Collective.
+  void change(Wakes wakes, Proposal proposal) {
+    exchange.begin_change();
+    MembershipChange c(for_change(), std::move(wakes), std::move(proposal));
+    index.index(world.atoms);
+    c.free_and_lock();
+    c.thaw_and_unlock();
+    c.freeze_and_lock();
+    groups.settle();
+    c.finish_bodies();
+    census.count_bodies();
+    census.count_stored();
+    label_bodies(world.atoms, shell, groups);
+    motion.is_stale();
+  }
+  /// Owned granules with these tags are locked; what of them touches is one body. Collective.
+  void lock(const std::vector<std::int64_t>& tags) {
+    Proposal p;
+    for (const std::int64_t tag : tags)
+      if (world.at(static_cast<int>(tag)) >= 0) {
+        p.chosen.push_back(tag);
+        const int i = world.at(static_cast<int>(tag));
+        AtRest& r = survey.rows()[i];  // it has this motion since now
+        r.velocity = world.atoms.velocity(i);
+        r.acceleration_around = Vec3::Zero();
+        r.since = world.run.step;
+      }
+    change({}, std::move(p));
+  }
+  /// This rank's atoms with these tags go to the store.
+  void put_away(const std::vector<std::int64_t>& tags) {
+    index.index(world.atoms);
+    for (const std::int64_t tag : tags)
+      if (const int* i = index.find(tag)) exchange.put_away(*i);
+    motion.is_stale();
+  }
+  /// Ghosts, lists and what ranks tell each other, as between a change and the next forces. Collective.
+  void reneighbour() {
+    census.count_bodies();
+    census.count_stored();
+    world.exchange();
+    world.borders();
+    handover.take_over();
+    groups.share();
+    world.contacts.build();
+    leave_out();
+    motion.is_stale();
+    motion.refresh();
+  }
+  void leave_out() {
+    std::vector<int> body;
+    for (int i = 0; i < world.atoms.owned + world.atoms.ghosts; ++i) body.push_back(groups.key_of_atom(i));
+    world.contacts.leave_out_pairs_within(body);
+  }
+  void compute_forces() {
+    world.compute_forces();
+    motion.refresh();
+    freezing.rebase_thawed();
+    motion.take_loads();
+  }
+  int body_of(std::int64_t tag) const { return solid.bodies().body_of(tag); }
+
+  SmallWorld& world;
+};
+
+}  // namespace solidcull
