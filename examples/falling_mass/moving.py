@@ -5,7 +5,7 @@ in which much moves take longer, for their lists are built more often.
     examples/falling_mass/moving.py [--frames N]
 
 A granule moves when it is faster than a share of sqrt(g d), 0.01 or 0.001. In the air, where the mass falls as one, none counts.
-Counts are means over a frame. About two minutes; needs out/oval.restart, which example.py makes.
+Counts are means over a frame. About two minutes; needs out/bed.restart, which example.py makes.
 """
 import argparse
 import re
@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1] / "validation")]
-import twin  # noqa: E402
+sys.path.insert(0, str(HERE.parents[1] / "validation"))
+from solidcull_runs import engine, errors, logs  # noqa: E402
 
 OUT = HERE / "out"
 GRANULES, DIAMETER, GRAVITY = 15600, 0.02, 9.81
@@ -24,8 +24,8 @@ SHARES = (0.01, 0.001)  # of sqrt(g d)
 EVERY, PER_FRAME = 20, 400  # steps: between counts, of a frame
 
 
-def deck():
-    """fall.in without its fix; the granules that are faster than each share are counted, beside the load on the floor."""
+def deck(file="out/moving.txt"):
+    """fall.in without its fix; the granules that are faster than each share are counted in `file`, beside the load on the floor."""
     lines = []
     for line in (HERE / "fall.in").read_text().splitlines():
         if line.startswith("fix cull"):
@@ -33,7 +33,7 @@ def deck():
                 limit = share * (GRAVITY * DIAMETER)**0.5
                 lines += [f"variable fast{k} atom (vx*vx+vy*vy+vz*vz)>{limit**2:.9g}", f"compute moving{k} all reduce sum v_fast{k}"]
             columns = " ".join(f"c_moving{k}" for k in range(len(SHARES)))
-            lines.append(f"fix moving all ave/time {EVERY} 1 {EVERY} {columns} v_load file out/moving.txt")
+            lines.append(f"fix moving all ave/time {EVERY} 1 {EVERY} {columns} v_load file {file}")
         elif line.startswith("unfix cull"):
             break
         else:
@@ -47,20 +47,16 @@ def main():
     settings = p.parse_args()
     if settings.frames < 1:
         p.error("--frames is at least 1")
-    if not (OUT / "oval.restart").exists():
-        sys.exit("moving.py: there is no out/oval.restart: run example.py first, it makes the oval")
-    try:
-        launcher = twin.find_launcher(None)
-        (OUT / "moving.in").write_text(deck())
-        text = twin.run_liggghts(launcher, OUT / "moving.in", HERE, OUT / "moving.log", {"frames": settings.frames})
-    except twin.TwinError as e:
-        sys.exit(f"moving.py: {e}")
+    if not (OUT / "bed.restart").exists():
+        raise errors.RunError("there is no out/bed.restart: run example.py first, it makes the oval")
+    (OUT / "moving.in").write_text(deck())
+    text = engine.run_liggghts(OUT / "moving.in", HERE, OUT / "moving.log", {"frames": settings.frames})
     table = np.loadtxt(OUT / "moving.txt", ndmin=2)
     counts, load = table[:, 1:-1], table[:, -1]
     counts[load == 0] = 0  # in the air
     frame = np.ceil(table[:, 0] / PER_FRAME).astype(int) - 1
     moving = np.array([counts[frame == k].mean(axis=0) for k in range(settings.frames)])
-    printed = max((t for t in twin.parse_log(text) if "CPU" in t.columns), key=lambda t: len(t.rows))
+    printed = max((t for t in logs.parse_log(text) if "CPU" in t.columns), key=lambda t: len(t.rows))
     seconds = np.diff([row[printed.columns.index("CPU")] for row in printed.rows])
     print("frame  seconds" + "".join(f"  faster than {s:g} sqrt(g d)" for s in SHARES))
     for k, row in enumerate(moving):
@@ -74,4 +70,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    errors.command("moving", main)

@@ -1,126 +1,65 @@
-"""Settles the bed once, strikes it unculled and culled, and leaves the table, a plot and pictures in out/."""
-import json
-import re
+"""Settles the bed once, strikes it five times unculled and five times culled, the ball 10 um farther in each pair of runs, and leaves
+the table, a plot and pictures in out/."""
 import sys
 from pathlib import Path
 
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parent), str(HERE.parents[1] / "validation")]
-import pictures  # noqa: E402
-import twin      # noqa: E402
+sys.path.insert(0, str(HERE.parents[1] / "validation"))
+from solidcull_runs import errors, examples, pictures, plots  # noqa: E402
+from solidcull_runs.dumps import read_final  # noqa: E402
+from solidcull_runs.surfaces import height_map  # noqa: E402
 
-OUT = HERE / "out"
 BOX, DEPTH, STRIKER = 0.075, 0.062, 0.005  # m: width of the bed, height shown, larger radii are the ball
 TIME_STEP = 3e-5                           # s
-SHIFTS = (0, 2.6e-8, -2.6e-8)              # m: the ball's x in each run, 1e-5 granule diameters apart
+APART = [k * 1e-5 for k in (0, 1, -1, 2, -2)]  # m: the ball's x in each pair of runs
 METRICS = ("v_depth", "v_depth:max", "v_force:max", "c_bedke:max", "c_bedke:mean", "v_floor:max", "v_floor", "c_path")
 CELL = 0.0005                              # m, of the height map
-
-
-def settle(launcher):
-    """The settled bed, unless it is there and newer than the decks that make it."""
-    bed = OUT / "bed.restart"
-    if bed.exists() and all(bed.stat().st_mtime > (HERE / f).stat().st_mtime for f in ("settle.in", "bed.in", "floor.stl")):
-        return
-    print("settling 20,000 granules: one to two minutes, only the first time", flush=True)
-    twin.run_liggghts(launcher, HERE / "settle.in", HERE, OUT / "settle.log", {"restart": "out/bed.part"})
-    (OUT / "bed.part").rename(bed)
+SHOWN = 4                                  # moments in the picture
 
 
 def surface(granules):
-    """Height of the bed's surface (m) over a grid of CELL."""
-    granules = granules[granules["radius"] < STRIKER]
-    n = round(BOX / CELL)
-    height = np.zeros((n, n))
-    reach = int(np.ceil(granules["radius"].max() / CELL))
-    i, j = (granules["x"] / CELL).astype(int), (granules["y"] / CELL).astype(int)
-    for di in range(-reach, reach + 1):
-        for dj in range(-reach, reach + 1):
-            x, y = (i + di + 0.5) * CELL, (j + dj + 0.5) * CELL
-            left = granules["radius"]**2 - (x - granules["x"])**2 - (y - granules["y"])**2
-            k = (left > 0) & (i + di >= 0) & (i + di < n) & (j + dj >= 0) & (j + dj < n)
-            np.maximum.at(height, (i[k] + di, j[k] + dj), granules["z"][k] + np.sqrt(left[k]))
-    return height
+    """Height of the bed's surface (m), without the ball."""
+    return height_map(granules[granules["radius"] < STRIKER], (0, 0), (BOX, BOX), CELL)
 
 
-def crater(run):
+def crater(run, out):
     """What the strike did to the surface, from the places of all granules at the end."""
-    if run.final is None:
-        raise twin.TwinError(f"{run.name} ended without writing its granules; see {OUT / (run.name + '.log')}")
-    change = surface(run.final) - surface(twin.read_final(OUT / "start.dump"))
+    change = surface(run.final) - surface(read_final(out / f"{run.name}.start"))
     return {"crater volume": float(-change[change < 0].sum() * CELL**2),
             "heap volume": float(change[change > 0].sum() * CELL**2)}
 
 
+def milliseconds(step):
+    return step * TIME_STEP * 1e3
+
+
 def plot(runs, file):
-    import matplotlib
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-    fig, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(7, 6))
-    for kind, colour, width in (("unculled", "0.75", 4), ("culled", "tab:blue", 1)):
-        for k, run in enumerate(runs[kind]):
-            step, height = run.series("c_ballz")
-            top.plot(step * TIME_STEP * 1e3, height * 1e3, color=colour, lw=width, label=None if k else f"{kind}, {len(runs[kind])} runs")
+    figure, (top, bottom) = plots.rows(2, (7, 6))
+    for style, run in plots.of_both(runs):
+        step, height = run.series("c_ballz")
+        top.plot(milliseconds(step), height * 1e3, **style)
     top.set_ylabel("height of the ball's centre (mm)")
     top.legend()
-    for run in runs["culled"]:
-        if run.counts:
-            bottom.plot(run.counts["step"] * TIME_STEP * 1e3, run.counts["exterior"], color=pictures.STATES[0][1], lw=1.2)
+    plots.exterior(bottom, runs["culled"], milliseconds)
     bottom.axhline(len(runs["unculled"][0].final), color="0.75", lw=4)
     bottom.set(xlabel="time (ms)", ylabel="exterior granules", ylim=(0, None))
-    fig.tight_layout()
-    fig.savefig(file, dpi=120)
-    plt.close(fig)
+    plots.save(figure, file)
 
 
-def run_for_files(launcher):
-    """One more culled run, not timed, that writes what ParaView opens and the pictures are drawn from."""
-    files = " bed 400 out/bed.*.vtp mesh 400 out/mesh.*.vtp mesh 4000 out/mesh.*.vdb"
-    deck = re.sub(r"^(fix\s+\S+\s+\S+\s+solid/cull.*)$", r"\1" + files, (HERE / "impact.in").read_text(), flags=re.M)
-    (OUT / "files.in").write_text(deck)
-    twin.run_liggghts(launcher, OUT / "files.in", HERE, OUT / "files.log", {})
+def moments(out, steps, runs):
+    for step in sorted({steps[round(k) - 1] for k in np.geomspace(1, len(steps), SHOWN)}):
+        yield (f"{milliseconds(step):.0f} ms",
+               *pictures.cut_away_files(out, step, BOX / 2, (0, 0, 0), (BOX, BOX, DEPTH), striker_radius=STRIKER))
 
 
-def draw(count=4):
-    """Cut-away pictures at a few times; False when the fix has left no files to draw."""
-    steps = pictures.steps_of(OUT / "bed.*.vtp")
-    if not steps:
-        return False
-    moments = []
-    for step in sorted({steps[round(k) - 1] for k in np.geomspace(1, len(steps), count)}):
-        mesh = pictures.file_at(OUT / "mesh.*.vtp", step)
-        images = pictures.cut_away(pictures.read_vtp(OUT / f"bed.{step}.vtp"), pictures.read_vtp(mesh) if mesh else None,
-                                   BOX / 2, (0, 0, 0), (BOX, BOX, DEPTH), striker_radius=STRIKER)
-        moments.append((f"{step * TIME_STEP * 1e3:.0f} ms", *images))
-    pictures.film_strip(moments, OUT / "cut-away.png")
-    return True
-
-
-def main():
-    OUT.mkdir(exist_ok=True)
-    launcher = twin.find_launcher()
-    settle(launcher)
-    for old in [f for kind in ("bed.*.vtp", "mesh.*.vtp", "mesh.*.vdb") for f in OUT.glob(kind)]:
-        old.unlink()
-    print("striking the bed, unculled and culled in turns", flush=True)
-    result, runs = twin.compare(HERE / "impact.in", METRICS, launcher, OUT, unculled=3, culled=3, vary=("dx", SHIFTS),
-                                extra=crater, say=lambda line: print("  " + line, flush=True))
-    (OUT / "twin.json").write_text(json.dumps(result, indent=1) + "\n")
-    text = twin.table(result)
-    (OUT / "table.txt").write_text(text + "\n")
-    plot(runs, OUT / "impact.png")
-    run_for_files(launcher)
-    drawn = draw()
-    print(f"\n{text}\n\nplot: {OUT / 'impact.png'}" + (f"\npictures: {OUT / 'cut-away.png'}" if drawn else
-          "\nno pictures: the fix wrote no out/bed.*.vtp"))
-    book = result["ledger"]
-    return 1 if not drawn or book["lost"] or book["ids_missing"] else 0
-
+IMPACT = examples.Example(
+    here=HERE, deck="impact.in", bed="settle.in", bed_takes="settling 20,000 granules: one to two minutes",
+    sources=("bed.in", "floor.stl"), granules=20001, steps=8000, wanted=METRICS, figures=crater, plot=plot, moments=moments,
+    files_every=400, vdb_every=4000, vary=("dx", APART), runs=5, at_once=2,
+    few={"L": 0.02, "granules": 900, "steps": 700}, few_bed={"L": 0.02, "granules": 900, "dampsteps": 1000, "freesteps": 50},
+    few_granules=901, few_steps=700, few_files_every=100, few_keywords="every 20 calm 1 speed 0.1")
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except twin.TwinError as e:
-        sys.exit(f"impact: {e}")
+    errors.command("impact", lambda: examples.main(IMPACT))

@@ -11,19 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parents[1] / "validation"))
+from solidcull_runs import errors  # noqa: E402
+from solidcull_runs.dumps import snapshots  # noqa: E402
+
 DIAMETER = 0.01  # m
-
-
-def snapshots(file):
-    """(time step, places) of each; the columns are x y radius."""
-    with open(file) as lines:
-        while lines.readline():
-            step = int(lines.readline())
-            lines.readline()
-            count = int(lines.readline())
-            for _ in range(5):
-                lines.readline()
-            yield step, np.array([lines.readline().split()[:2] for _ in range(count)], float)
 
 
 def still(then, now, shift=0.0):
@@ -34,10 +27,12 @@ def still(then, now, shift=0.0):
 
 
 def main():
-    file = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parent / "out" / "unculled-1.places"
+    file = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "out" / "unculled-1.places"
     if not file.is_file():
-        sys.exit(f"moving: {file} is not there: run example.py first")
-    frames, shares = list(snapshots(file)), []
+        raise errors.RunError(f"{file} is not there: run example.py first")
+    frames, shares = [(step, rows[:, :2]) for step, _, rows in snapshots(file)], []
+    if len(frames) < 2:
+        raise errors.RunError(f"{file} holds one snapshot: nothing can have moved")
     for (step, then), (after, now) in zip(frames, frames[1:]):
         chance = still(then, now, 0.3 * DIAMETER)
         shares.append(1 - (still(then, now) - chance) / (1 - chance))
@@ -45,4 +40,5 @@ def main():
     print(f"mean {np.mean(shares):.3f}: N / N_moving = {1 / np.mean(shares):.2f}")
 
 
-main()
+if __name__ == "__main__":
+    errors.command("moving", main)

@@ -10,11 +10,9 @@ All figures: out/choices.json, table out/choices.txt, plot out/choices.png. Exit
 import argparse
 import json
 import statistics
-import sys
 
 import scale
-import tiles
-import twin
+from solidcull_runs import errors, plots  # scale.py has made them known
 
 CHOICES = {"live": "exterior live", "live, depth 1": "exterior live depth 1", "live, tolerance 1": "exterior live tolerance 1 0",
            "live, tolerance 10": "exterior live tolerance 10 0", "sleep": "exterior sleep",
@@ -52,10 +50,7 @@ def table(report, size):
 
 
 def plot(report, file):
-    import matplotlib
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-    fig, ax = plt.subplots(figsize=(6.5, 4.5))
+    fig, ax = plots.plt.subplots(figsize=(6.5, 4.5))
     for choice, r in report.items():
         colour = "tab:blue" if choice.startswith("sleep") else "tab:brown"
         ax.plot([r["time"]] * 2, [r["mean"], r["largest"]], "-", color=colour, lw=0.8)
@@ -65,9 +60,7 @@ def plot(report, file):
     ax.axhline(1, color="0.5", ls="--", lw=0.8)
     ax.set(xlabel="run time over that of the unculled run", ylabel="error over margin: mean (o) and largest (-)")
     ax.grid(alpha=0.3)
-    fig.tight_layout()
-    fig.savefig(file, dpi=120)
-    plt.close(fig)
+    plots.save(fig, file)
 
 
 def main(argv=None):
@@ -96,8 +89,4 @@ def main(argv=None):
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except (twin.TwinError, tiles.RestartError) as e:
-        print(f"choices: {e}", file=sys.stderr)
-        sys.exit(2)
+    errors.command("choices", main)

@@ -7,39 +7,32 @@ Makes the beds that are missing (out/bed-SIZE.restart), then runs each size uncu
 (impact.in) and by hand (control.in), in turns, each on one core, and prints run times, parts, memory and errors. Every run is
 kept in out/runs/; a run that is there, made of the same decks, bed and (culled) launcher, is not repeated, so that an
 interrupted series goes on where it stopped. All figures: out/scale.json, table out/scale.txt, plot out/scale.png.
-`--idle`: no ball, nothing moves. `--few-steps`: tiny beds, a few steps, always run anew. `--table`: runs nothing, prints what is there.
+`--idle`: no ball, nothing moves. `--few-steps`: tiny beds, a few steps, always run anew; what can be checked then is. `--table`: runs nothing, prints what is there.
 Exit: 0 all runs there and no granule lost, 1 else, 2 a run failed.
 """
 import argparse
 import hashlib
-import importlib.util
 import json
+import math
 import os
 import re
 import statistics
-import subprocess
 import sys
 import time
 from pathlib import Path
 
+import numpy as np
+
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parent)]
-import numpy as np  # noqa: E402
-import tiles        # noqa: E402
-import twin         # noqa: E402
+sys.path.insert(0, str(HERE.parent))
+import tiles  # noqa: E402
+from solidcull_runs import beds, decks, engine, errors, examples, logs, metrics, plots, tables  # noqa: E402
+from solidcull_runs.dumps import element_normal_loads, read_final  # noqa: E402
+from solidcull_runs.meshes import grid, stl_text  # noqa: E402
 
-
-def load(name, file):
-    spec = importlib.util.spec_from_file_location(name, file)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-example = load("impact_example", HERE.parents[1] / "examples" / "impact" / "example.py")  # how it measures the crater
+impact = examples.load("impact")  # how it measures the crater
 
 OUT = HERE / "out"
-LAUNCHER = os.environ.get("SOLIDCULL_LAUNCHER")  # default: as twin finds it
 BALL = 0.006                   # m: radius
 FALL = 0.00224                 # m: what the ball of examples/impact falls before it touches a granule
 NEAR = 0.03                                   # m: of the blow's own crater, around its middle
@@ -49,6 +42,7 @@ MARGIN = tiles.GRANULE         # m: the sides stand as far outside of the tiles:
 ELEMENT = 0.0375               # m: edge of the floor's triangles
 SAMPLE = 0.5                   # s between two looks at the memory
 KINDS = ("unculled", "culled", "control")
+SLEEP = "exterior sleep"       # the keywords of the fix, if no others are given
 
 # name: tiles in x and y, the bed that it is laid of (none: of the tile itself), steps damped, then how often at most stopped and left free for how long
 BEDS = {"20k": ((1, 1), None, 12000, 10, 1000), "base": ((3, 3), None, 5000, 4, 300),
@@ -64,51 +58,26 @@ few_steps = False
 
 def text_of(*files):
     """Decks without comments and empty lines: what a kept result depends on."""
-    lines = "\n".join((HERE / f).read_text() for f in files).splitlines()
-    return "\n".join(" ".join(words) for words in map(twin.words_of, lines) if words)
+    return decks.without_comments(line for f in files for line in (HERE / f).read_text().splitlines())
 
 
 def sides_of(copies):
     return [round(n * PERIOD + 2 * MARGIN, 9) for n in copies]
 
 
-def made(file, recipe, make):
-    """The file, made unless it is there, made of the same. `make(part)` writes it."""
-    note = file.with_suffix(".recipe")
-    if not (file.exists() and note.exists() and note.read_text() == recipe):
-        print(f"  making {file.name}", flush=True)
-        part = file.with_suffix(".part")
-        make(part)
-        part.rename(file)
-        note.write_text(recipe)
-    return file
-
-
-def engine(deck, log, variables):
-    return twin.run_liggghts(twin.find_launcher(LAUNCHER), HERE / deck, HERE, log, variables)
-
-
 def tile():
     """The settled tile, periodic in x and y."""
     variables = {"P": PERIOD, "granules": GRANULES, **(FEW_TILE if few_steps else {})}
-    return made(OUT / "tile.restart", json.dumps(variables) + text_of("tile.in", "material.in"),
-                lambda part: engine("tile.in", OUT / "tile.log", {**variables, "restart": part}))
+    return beds.made(OUT / "tile.restart", json.dumps(variables) + text_of("tile.in", "material.in"),
+                lambda part: engine.run_liggghts(HERE / "tile.in", HERE, OUT / "tile.log", {**variables, "restart": part}))
 
 
 def write_floor(file, sides):
     """The floor as a regular grid of triangles, in rows along y, two a square: element 2 (i ny + j) is the lower right one."""
     edge = 2 * MARGIN  # how far it reaches beyond the sides
-    n = [max(1, round((s + 2 * edge) / ELEMENT)) for s in sides]
-    x, y = (np.linspace(-edge, s + edge, k + 1) for s, k in zip(sides, n))
-    with open(file, "w") as f:
-        f.write("solid floor\n")
-        for i in range(n[0]):
-            for j in range(n[1]):
-                a, b, c, d = (x[i], y[j]), (x[i + 1], y[j]), (x[i + 1], y[j + 1]), (x[i], y[j + 1])
-                for corners in ((a, b, c), (a, c, d)):
-                    f.write("facet normal 0 0 1\nouter loop\n" + "".join(f"vertex {u:.9g} {v:.9g} 0\n" for u, v in corners)
-                            + "endloop\nendfacet\n")
-        f.write("endsolid floor\n")
+    size = [s + 2 * edge for s in sides]
+    n = [max(1, round(s / ELEMENT)) for s in size]
+    file.write_text(stl_text("floor", grid((-edge, -edge, 0), (size[0], 0, 0), (0, size[1], 0), *n)))
 
 
 def bed(name):
@@ -118,7 +87,7 @@ def bed(name):
     source_file = bed(source)["restart"] if source else tile()
     variables = {"L": sides[0], "W": sides[1], "dampsteps": damp, "stills": stills, "freesteps": free}
     recipe = json.dumps([variables, copies, ELEMENT, TOP]) + text_of("relax.in", "material.in", "bed.in") + (HERE / "tiles.py").read_text() \
-        + source_file.with_suffix(".recipe").read_text()
+        + beds.recipe_of(source_file)
 
     def make(part):
         laid, dump = OUT / f"tiles-{name}.part", OUT / f"bed-{name}.dump"
@@ -128,15 +97,15 @@ def bed(name):
             tiles.Bed(source_file, (1, 1), PERIOD, 0, copies != (1, 1))
         tiles.lay(of, laid, copies, PERIOD, MARGIN, TOP)
         began = time.monotonic()
-        log = engine("relax.in", OUT / f"bed-{name}.log", {**variables, "floormesh": floor, "tiles": laid, "dump": dump, "restart": part})
+        log = engine.run_liggghts(HERE / "relax.in", HERE, OUT / f"bed-{name}.log", {**variables, "floormesh": floor, "tiles": laid, "dump": dump, "restart": part})
         laid.unlink()
-        np.save(granules, twin.read_final(dump))
+        np.save(granules, read_final(dump))
         dump.unlink()
-        rows = [r for t in twin.parse_log(log) for r in [dict(zip(t.columns, t.rows[-1]))]]
+        rows = [r for t in logs.parse_log(log) for r in [dict(zip(t.columns, t.rows[-1]))]]
         print(f"  {name}: {rows[-1]['Atoms']:,.0f} granules, kinetic energy {rows[-1]['KinEng']:.3g} J, fastest "
               f"{1e3 * rows[-1]['fastest']:.3g} mm/s; {time.monotonic() - began:.0f} s", flush=True)
 
-    restart = made(OUT / f"bed-{name}.restart", recipe, make)
+    restart = beds.made(OUT / f"bed-{name}.restart", recipe, make)
     return {"restart": restart, "floor": floor, "granules": granules, "sides": sides, "hash": hashlib.sha1(recipe.encode()).hexdigest()}
 
 
@@ -167,92 +136,52 @@ def memory_of(pid):
 
 def run_engine(deck, log, variables):
     """Runs a deck and watches it: the text of its log, and the figures of the process."""
-    command = [twin.find_launcher(LAUNCHER), "-in", str(deck), "-log", str(log), "-echo", "log"]
-    for name, value in variables.items():
-        command += ["-var", name, str(value)]
-    samples, began, busy, before = [], time.monotonic(), busy_seconds(), os.times()
-    with open(log.with_suffix(".screen"), "w") as f:  # the log is flushed at each row, the screen is not
-        process = subprocess.Popen(command, cwd=HERE, env=twin.environment(), stdin=subprocess.DEVNULL, stdout=f, stderr=subprocess.STDOUT)
-        try:
-            while process.poll() is None:
-                now = memory_of(process.pid)
-                if now and (not samples or time.monotonic() - began - samples[-1][0] > SAMPLE):
-                    samples.append([round(time.monotonic() - began, 2), *now])
-                try:
-                    process.wait(SAMPLE / 2)
-                except subprocess.TimeoutExpired:
-                    pass
-        finally:
-            if process.poll() is None:
-                process.kill()
-    wall = time.monotonic() - began
-    after = os.times()
-    own = after.children_user + after.children_system - before.children_user - before.children_system
-    text = log.read_text(errors="replace") if log.exists() else ""
-    if process.returncode:
-        said = twin.error_in(text + log.with_suffix(".screen").read_text(errors="replace"))
-        raise twin.TwinError(f"{log.stem}: LIGGGHTS stopped with status {process.returncode}: {said} (all of it: {log}, .screen)")
+    samples, busy, before = [], busy_seconds(), time.monotonic()
+
+    def watch(process):
+        if not samples or time.monotonic() - before - samples[-1][0] > SAMPLE:
+            if now := memory_of(process.child.pid):
+                samples.append([round(time.monotonic() - before, 2), *now])
+    process = engine.Process(engine.find_launcher(), deck, HERE, log, variables, screen=log.with_suffix(".screen"))
+    text = process.wait(watch)
     thinned = samples[::max(1, len(samples) // 500)]
-    return text, {"wall": wall, "others_busy": max(0.0, (busy_seconds() - busy - own) / wall), "memory": thinned,
-                  "peak_mb": max((s[2] for s in samples), default=0), "cpu": own}
+    return text, {"wall": process.wall, "others_busy": max(0.0, (busy_seconds() - busy - process.cpu) / process.wall), "memory": thinned,
+                  "peak_mb": max((s[2] for s in samples), default=0), "cpu": process.cpu}
 
 
 def deck_of(scene, kind):
     """The lines of one run's deck; what hangs on the fix is left out of an unculled one."""
     if kind == "control":
-        return twin.read_deck(HERE / "control.in") + twin.end_of_deck("${final}")
-    lines = twin.make_deck(twin.read_deck(HERE / f"{scene}.in"), "cull", kind == "culled", None, "${base}")
+        return decks.read_deck(HERE / "control.in") + [f'print "{logs.TO_HERE}"'] + decks.end_of_deck("${final}")
+    lines = decks.make_deck(decks.read_deck(HERE / f"{scene}.in"), "cull", kind == "culled", None, "${base}")
     lines = [line for line in lines if "twin_counts" not in line]
     return [line.replace("${base}.final", "${final}") for line in lines]
 
 
-def sha1(file):
-    return hashlib.sha1(Path(file).read_bytes()).hexdigest()
-
-
-def hash_of_launcher():
-    """Of the launcher and the library that holds the fix."""
-    launcher = twin.find_launcher(LAUNCHER)
-    needs = subprocess.run(["ldd", launcher], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout
-    library = re.search(r"libsolidcull\S* => (/\S+)", needs)
-    return sha1(launcher) + (sha1(library[1]) if library else "")
-
-
 def window(granules, sides):
-    """The granules of the square of example.BOX around the middle, moved to where the bed of examples/impact is."""
+    """The granules of the square of impact.BOX around the middle, moved to where the bed of examples/impact is."""
     near = np.ones(len(granules), dtype=bool)
     for axis, side in zip("xy", sides):
-        near &= abs(granules[axis] - side / 2) < example.BOX / 2
+        near &= abs(granules[axis] - side / 2) < impact.BOX / 2
     granules = granules[near]
     for axis, side in zip("xy", sides):
-        granules[axis] -= side / 2 - example.BOX / 2
+        granules[axis] -= side / 2 - impact.BOX / 2
     return granules
 
 
 def crater(before, after, sides, within=np.inf):
     """Volume (m^3) that the surface around the middle, as far as `within` (m), has lost and gained."""
-    change = example.surface(window(after, sides)) - example.surface(window(before, sides))
-    place = (np.arange(len(change)) + 0.5) * example.CELL - example.BOX / 2
+    change = impact.surface(window(after, sides)) - impact.surface(window(before, sides))
+    place = (np.arange(len(change)) + 0.5) * impact.CELL - impact.BOX / 2
     change = change[np.hypot(place[:, None], place) < within]
-    return float(-change[change < 0].sum() * example.CELL**2), float(change[change > 0].sum() * example.CELL**2)
-
-
-def element_loads(file):
-    """Normal load (N) on each element of the floor, by its number, of a mesh/vtk dump with `id stress`: every triangle has its own
-    three points there, in its own order."""
-    def values(heading):
-        return np.array(re.search(heading + r"[^\n]*\n([-+.\deE\s]+)", text)[1].split(), dtype=float)
-    text = Path(file).read_text()
-    corner = values("POINTS").reshape(-1, 3, 3)
-    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
-    return (values("normal_stress_average") * area)[np.argsort(values("meshid"))]
+    return float(-change[change < 0].sum() * impact.CELL**2), float(change[change > 0].sum() * impact.CELL**2)
 
 
 def figures_of(scene, kind, text, made_bed, final, loads):
     """What is compared, and what a culled run says of itself."""
-    main = max((t for t in twin.parse_log(text) if t.loop_time is not None), key=lambda t: len(t.rows))
+    main = max((t for t in logs.parse_log(text) if t.loop_time is not None), key=lambda t: len(t.rows))
     columns = {c: np.array([row[k] for row in main.rows]) for k, c in enumerate(main.columns)}
-    granules, before = twin.read_final(final), np.load(made_bed["granules"])
+    granules, before = read_final(final), np.load(made_bed["granules"])
     moved = granules[granules["id"] <= len(before)]
     floor = columns["floor"][1:]  # the row before the first step counts the mesh's load twice
     figures = {"loop_time": main.loop_time, "steps": int(columns["Step"][-1] - columns["Step"][0]), "granules": len(granules),
@@ -266,7 +195,7 @@ def figures_of(scene, kind, text, made_bed, final, loads):
             "crater volume (m3)": lost, "heap volume (m3)": gained}
         figures["crater_near"] = crater(before, granules, made_bed["sides"], NEAR)[0]
         if loads.exists():
-            figures["element_loads"] = [round(float(x), 7) for x in element_loads(loads)]
+            figures["element_loads"] = [round(float(x), 7) for x in element_normal_loads(loads)]
     else:
         drift = np.sqrt(sum((moved[c] - before[c])**2 for c in "xyz"))
         figures["metrics"] = {"kinetic energy, largest (J)": columns["bedke"].max(), "floor load, end (N)": floor[-1],
@@ -279,7 +208,30 @@ def figures_of(scene, kind, text, made_bed, final, loads):
         parts = re.search(r"in the fix since it was made: (.*)$", figures["said"][-1]) if figures["said"] else None
         figures["parts"] = {name: float(value) for name, value in (w.rsplit(" ", 1) for w in parts[1].split(", "))} if parts else {}
         figures["seconds"] = sum(figures["parts"].values())
+        # what LIGGGHTS holds and what the store holds, and the fix's own counts: smallest and largest over the rows
+        wholes = columns["Atoms"] + columns["cull[3]"], columns["cull[1]"] + columns["cull[2]"] + columns["cull[3]"]
+        figures["wholes"] = [[float(w.min()), float(w.max())] for w in wholes]
     return figures
+
+
+def check_few(run, text, granules, steps):
+    """Raises RunError, one line, where a run of a few steps shows that its deck is broken."""
+    broken = [name for name, value in run["metrics"].items() if not math.isfinite(value)]
+    if not logs.reached_the_end(text):
+        wrong = "did not reach the end of its deck"
+    elif run["steps"] != steps:
+        wrong = f"made {run['steps']} steps, not {steps}"
+    elif run["granules"] != granules:
+        wrong = f"ended with {run['granules']} granules, not {granules}"
+    elif broken:
+        wrong = f"has no number for {', '.join(broken)}"
+    elif run["kind"] == "culled" and run["wholes"] != [[granules, granules]] * 2:
+        wrong = f"held {run['wholes']} granules on the way, not {granules}"
+    elif run["kind"] == "culled" and run["variables"]["culling"] == SLEEP and not run["interior"] > 0:
+        wrong = "locked no granule"  # with a cover of its own the tiny bed may well lock none
+    else:
+        return
+    raise errors.RunError(f"few steps: {run['name']} {wrong}")
 
 
 def one_run(scene, size, kind, k, settings, of=""):
@@ -303,9 +255,8 @@ def one_run(scene, size, kind, k, settings, of=""):
     if kind == "culled":
         variables["culling"] = settings.culling
     lines = deck_of(scene, kind)
-    words = "\n".join(" ".join(w) for w in map(twin.words_of, lines) if w)
-    recipe = hashlib.sha1(json.dumps([words, text_of("scene.in", "ball.in", "material.in", "bed.in"), variables, made_bed["hash"],
-                                      hash_of_launcher() if kind == "culled" else ""]).encode()).hexdigest()
+    recipe = hashlib.sha1(json.dumps([decks.without_comments(lines), text_of("scene.in", "ball.in", "material.in", "bed.in"), variables, made_bed["hash"],
+                                      engine.hash_of_fix(engine.find_launcher()) if kind == "culled" else ""]).encode()).hexdigest()
     old = json.loads(kept.read_text()) if kept.exists() else None
     if old and (settings.table or (old["recipe"] == recipe and not few_steps)):
         return {**old, "stale": old["recipe"] != recipe}
@@ -319,6 +270,8 @@ def one_run(scene, size, kind, k, settings, of=""):
     steps = sorted(place.glob(elements.name), key=lambda f: int(f.stem.rsplit("-", 1)[1]))
     run = {"name": name, "scene": scene, "size": size, "kind": kind, "date": time.strftime("%Y-%m-%d %H:%M"), "recipe": recipe,
            "variables": variables, **watched, **figures_of(scene, kind, text, made_bed, final, steps[-1] if steps else place / "none")}
+    if few_steps:
+        check_few(run, text, variables["granules"] + (scene == "impact"), settings.steps)
     final.unlink()
     kept.with_suffix(".part").write_text(json.dumps(run) + "\n")
     kept.with_suffix(".part").rename(kept)
@@ -365,11 +318,7 @@ def compared(runs, kind):
     result["ids_good"] = all(r["ids"] == unculled[0]["ids"] for r in own)
     result["metrics"] = {}
     for name in unculled[0]["metrics"]:
-        a, b = [r["metrics"][name] for r in unculled], [r["metrics"][name] for r in own]
-        mean, spread = statistics.fmean(a), max(a) - min(a) if len(a) >= 3 else None
-        error, margin = abs(statistics.fmean(b) - mean), max(0.02 * abs(mean), spread or 0.0)
-        result["metrics"][name] = {"unculled": a, kind: b, "mean": mean, "noise_floor": spread, "error": error, "margin": margin,
-                                   "good": error <= margin}
+        result["metrics"][name] = metrics.judged([r["metrics"][name] for r in unculled], [r["metrics"][name] for r in own])
     if all("crater_near" in r for r in unculled + own):  # runs that were kept may be older
         result["crater_near"] = [statistics.fmean(r["crater_near"] for r in rs) for rs in (unculled, own)]
     if all("element_loads" in r for r in unculled + own):
@@ -394,11 +343,7 @@ def table(report):
     for size, of_size in report.items():
         for kind, c in of_size["against"].items():
             lines += ["", f"{size} {kind}: granules lost {c['lost']}, ids {'as unculled' if c['ids_good'] else 'NOT AS UNCULLED'}"]
-            lines.append(f"  {'metric':30} {'unculled':>12} {'error':>9} {'noise floor':>11} {'margin':>8}")
-            for name, m in c["metrics"].items():
-                floor = "-" if m["noise_floor"] is None else twin.percent(m["noise_floor"], m["mean"])
-                lines.append(f"  {name:30} {m['mean']:12.6g} {twin.percent(m['error'], m['mean']):>9} {floor:>11} "
-                             f"{twin.percent(m['margin'], m['mean']):>8} {'good' if m['good'] else 'OUTSIDE'}")
+            lines += [f"  {row}" for row in tables.metric_rows(c["metrics"])]
             if "crater_near" in c:
                 lines.append(f"  crater within {1000 * NEAR:g} mm (m3): {c['crater_near'][0]:.6g} unculled, {c['crater_near'][1]:.6g} {kind}")
             if "element_loads" in c:
@@ -419,10 +364,7 @@ def note(run):
 
 
 def plot(report, file):
-    import matplotlib
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-    fig, ax = plt.subplots(figsize=(6, 4.5))
+    fig, ax = plots.plt.subplots(figsize=(6, 4.5))
     for kind, style in (("unculled", "o-"), ("culled", "s-"), ("control", "^--")):
         points = [(s["granules"], s["loop_time"]) for r in report.values() for k, s in r["kinds"].items() if k == kind]
         if points:
@@ -430,9 +372,7 @@ def plot(report, file):
     ax.set(xlabel="granules", ylabel="loop time (s)")
     ax.legend()
     ax.grid(alpha=0.3, which="both")
-    fig.tight_layout()
-    fig.savefig(file, dpi=120)
-    plt.close(fig)
+    plots.save(fig, file)
 
 
 def main(argv=None):
@@ -441,7 +381,7 @@ def main(argv=None):
     p.add_argument("--sizes", help="default: all that BEDS has: 20k,160k,1.28M")
     p.add_argument("--only", default="", help="unculled, culled or control, or several; default all (--idle: no control)")
     p.add_argument("--runs", type=int, default=1, help=f"of each kind, 1 to {len(SHIFTS)}; three unculled give the noise floor")
-    p.add_argument("--culling", default="exterior sleep", help="the keywords of the fix")
+    p.add_argument("--culling", default=SLEEP, help="the keywords of the fix")
     p.add_argument("--reach", type=float, default=0.04, help="m: what the control lets move around the impact")
     p.add_argument("--steps", type=int, help="default: 8000, --idle 10000")
     p.add_argument("--idle", action="store_true")
@@ -495,8 +435,4 @@ def main(argv=None):
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except (twin.TwinError, tiles.RestartError) as e:
-        print(f"scale: {e}", file=sys.stderr)
-        sys.exit(2)
+    errors.command("scale", main)

@@ -9,6 +9,8 @@ import struct
 
 import numpy as np
 
+from solidcull_runs.errors import RunError
+
 # the header: a flag, then its value. Flags by what follows them (all others: an int)
 STRINGS, BIGINTS, DOUBLES = {0, 4, 22}, {5, 23, 25, 28, 31, 34}, set(range(37, 52))
 NATOMS, PERIODIC, BOUNDARY, BOX = 23, (13, 14), (16, 17, 18, 19), (37, 38, 39, 40, 41, 42)
@@ -19,7 +21,7 @@ NOBODY = 0                          # tag of a partner that is not there
 GRANULE = 0.0014                    # m: the largest radius
 
 
-class RestartError(Exception):
+class RestartError(RunError):
     pass
 
 

@@ -95,12 +95,17 @@ class Picture:
             self.put(box, (s >= 0) & (t >= 0) & (s + t <= 1), a[2] + s * p[2] + t * q[2], shade, colour)
 
 
+def colours_of(bed):
+    """The colour of each granule, by its state."""
+    return np.array([STATES[int(s)][1] for s in bed["state"]])
+
+
 def cut_away(bed, mesh, cut, low, high, pixels=700, striker_radius=np.inf):
     """Two images of one moment, the half with y < cut taken away: the granules by state, and the mesh with what is waking or
     larger than `striker_radius`."""
     x, r, state = bed["points"], bed["radius"].astype(float), bed["state"]
     big = r > striker_radius
-    colours = np.array([STATES[int(s)][1] for s in state])
+    colours = colours_of(bed)
     colours[big] = STRIKER
     shown = big | (x[:, 1] >= cut)
     granules = Picture(low, high, pixels)
@@ -128,24 +133,32 @@ def steps_of(pattern):
     return sorted(int(n) for n in names if n.isdigit())
 
 
-def film_strip(moments, file, pixels=700):
-    """Writes one picture: a column for each of `moments` (title, granules image, mesh image)."""
-    import matplotlib
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+def legend(figure, mesh=True):
+    """The key of the colours, below the pictures."""
     from matplotlib.patches import Patch
+    keys = [Patch(color=c, label=n) for n, c in STATES.values()] + mesh * [Patch(color=MESH, label="interface mesh")]
+    figure.legend(handles=keys, loc="lower center", ncol=len(keys), frameon=False)
+
+
+def film_strip(moments, file):
+    """Writes one picture: a column for each of `moments` (title, granules image, mesh image)."""
     from PIL import Image
-    fig, axes = plt.subplots(2, len(moments), squeeze=False, figsize=(3.2 * len(moments), 5.4))
+
+    from . import plots
+    figure, axes = plots.plt.subplots(2, len(moments), squeeze=False, figsize=(3.2 * len(moments), 5.4))
     for (top, bottom), (title, granules, mesh) in zip(axes.T, moments):
         top.imshow(granules)
         bottom.imshow(mesh)
         top.set_title(title)
     for ax in axes.flat:
         ax.axis("off")
-    keys = [Patch(color=c, label=n) for n, c in STATES.values()] + [Patch(color=MESH, label="interface mesh")]
-    fig.legend(handles=keys, loc="lower center", ncol=len(keys), frameon=False)
-    fig.tight_layout(rect=(0, 0.05, 1, 1))
+    legend(figure)
     full = io.BytesIO()
-    fig.savefig(full, dpi=110)
-    plt.close(fig)
+    plots.save(figure, full, rect=(0, 0.05, 1, 1), dpi=110)
     Image.open(full).convert("RGB").quantize(200, Image.Quantize.MAXCOVERAGE).save(file, optimize=True)  # a third of the size
+
+
+def cut_away_files(folder, step, cut, low, high, **how):
+    """cut_away() of the files `bed.STEP.vtp` and `mesh.STEP.vtp`; None if there is no bed of that step."""
+    bed, mesh = (file_at(folder / f"{kind}.*.vtp", step) for kind in ("bed", "mesh"))
+    return cut_away(read_vtp(bed), read_vtp(mesh) if mesh else None, cut, low, high, **how) if bed else None

@@ -1,0 +1,121 @@
+"""Finding LIGGGHTS with the fix, and running decks with it."""
+import hashlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+from .errors import RunError
+
+ROOT = Path(__file__).resolve().parents[2]
+NAMED_BY = "SOLIDCULL_LAUNCHER"  # variable of the environment: another launcher than that of build/
+POLL = 0.02                      # s between two looks at a process
+PATIENCE = 5                     # s that a process is given to stop
+
+
+def environment():
+    """Open MPI as root, in a container or bare root, or without mpirun, says nothing and does its work."""
+    env = dict(os.environ)
+    for name, value in {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1",
+                        "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OMPI_MCA_ess_singleton_isolated": "1",
+                        "OMPI_MCA_plm_rsh_agent": ""}.items():
+        env.setdefault(name, value)
+    return env
+
+
+def find_launcher(named=None):
+    """The launcher that is named, in the call or by NAMED_BY; else that of build/, else the one on the PATH."""
+    named = named or os.environ.get(NAMED_BY)
+    built = ROOT / "build" / "liggghts-solidcull"
+    found = shutil.which(named) if named else str(built) if os.access(built, os.X_OK) else shutil.which(built.name)
+    if not found:
+        raise RunError(f"no launcher at {named or built}: build it (cmake -S . -B build && cmake --build build) "
+                       f"or name it with --launcher or {NAMED_BY}")
+    return str(Path(found).absolute())
+
+
+def hash_of_fix(launcher):
+    """Of the launcher and of the library that holds the fix."""
+    needs = subprocess.run(["ldd", launcher], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout
+    files = [launcher, *re.findall(r"libsolidcull\S* => (/\S+)", needs)]
+    return hashlib.sha1(b"".join(Path(f).read_bytes() for f in files)).hexdigest()
+
+
+def error_in(log):
+    """The line of a log that says why LIGGGHTS stopped."""
+    lines = [line.strip() for line in log.splitlines() if line.strip()]
+    errors = [line for line in lines if line.startswith("ERROR")]
+    return (errors or lines or ["it printed nothing"])[-1]
+
+
+def ending(status):
+    """How a process ended, in words."""
+    if status < 0:
+        return f"was killed by signal {-status} ({signal.Signals(-status).name})"
+    return f"stopped with status {status}"
+
+
+class Process:
+    """A LIGGGHTS at work on a deck. What it prints is in the file `log`; with `screen`, LIGGGHTS itself writes the log, which is
+    then up to date wherever the deck says `flush yes`, and what it prints is in the file `screen`."""
+
+    def __init__(self, launcher, deck, folder, log, variables=None, ranks=1, screen=None):
+        self.log, self.screen = Path(log), screen and Path(screen)
+        command = [launcher, "-in", str(deck), *(["-log", str(log), "-echo", "log"] if screen else ["-log", "none", "-echo", "screen"])]
+        for name, value in (variables or {}).items():
+            command += ["-var", name, str(value)]
+        if ranks > 1:
+            command = ["mpirun", "--oversubscribe", "-np", str(ranks), *command]
+        self.wall = self.cpu = None  # s: from start to end, and of processors, once it has ended
+        self.began = time.monotonic()
+        with open(screen or log, "w") as f:
+            self.child = subprocess.Popen(command, cwd=folder, env=environment(), stdin=subprocess.DEVNULL, stdout=f,
+                                          stderr=subprocess.STDOUT)
+        self.waiter = threading.Thread(target=self.note_the_end, daemon=True)  # knows when, whatever this process is at
+        self.waiter.start()
+
+    def note_the_end(self):
+        _, status, used = os.wait4(self.child.pid, 0)
+        self.wall, self.cpu = time.monotonic() - self.began, used.ru_utime + used.ru_stime
+        self.child.returncode = os.waitstatus_to_exitcode(status)
+
+    def ended(self):
+        """Whether it has ended; then `wall` and `cpu` are known."""
+        return not self.waiter.is_alive()
+
+    def text(self):
+        """Its log, once it has ended well; RunError if it has not."""
+        text = self.log.read_text(errors="replace") if self.log.exists() else ""
+        if self.child.returncode:
+            said = text + (self.screen.read_text(errors="replace") if self.screen else "")
+            raise RunError(f"{self.log.stem}: LIGGGHTS {ending(self.child.returncode)}: {error_in(said)} (all of it: {self.log})")
+        return text
+
+    def wait(self, watch=None):
+        """Waits for its end; its log. `watch(process)` is called again and again."""
+        try:
+            while not self.ended():
+                if watch:
+                    watch(self)
+                time.sleep(POLL)
+        finally:
+            self.stop()
+        return self.text()
+
+    def stop(self):
+        """Ends it if it runs."""
+        if not self.ended():
+            self.child.terminate()
+            self.waiter.join(PATIENCE)
+        if not self.ended():
+            self.child.kill()
+            self.waiter.join()
+
+
+def run_liggghts(deck, folder, log, variables=None):
+    """Runs a deck in a folder, everything that it prints in the file `log`; that text."""
+    return Process(find_launcher(), deck, folder, log, variables).wait()

@@ -1,0 +1,34 @@
+"""The surface of a bed, from the places of its granules."""
+import itertools
+
+import numpy as np
+
+
+def height_map(granules, low, size, cell, ground=0.0):
+    """Height of the surface (m) over a grid of cells that begins at `low` (x, y) and is `size` wide; `ground` where no granule is."""
+    shape = round(size[0] / cell), round(size[1] / cell)
+    height = np.full(shape, float(ground))
+    x, y, z, r = granules["x"] - low[0], granules["y"] - low[1], granules["z"], granules["radius"]
+    reach = int(np.ceil(r.max() / cell))
+    i, j = np.floor(x / cell).astype(int), np.floor(y / cell).astype(int)
+    for di, dj in itertools.product(range(-reach, reach + 1), repeat=2):
+        left = r**2 - ((i + di + 0.5) * cell - x)**2 - ((j + dj + 0.5) * cell - y)**2
+        k = (left > 0) & (i + di >= 0) & (i + di < shape[0]) & (j + dj >= 0) & (j + dj < shape[1])
+        np.maximum.at(height, (i[k] + di, j[k] + dj), z[k] + np.sqrt(left[k]))
+    return height
+
+
+def rms(a, b):
+    """Root mean square of the difference of two maps, where both have a value."""
+    return float(np.sqrt(np.nanmean((a - b)**2)))
+
+
+def centre_height(granules):
+    """Height of the centre of mass (m)."""
+    return float(np.average(granules["z"], weights=granules["mass"]))
+
+
+def outside(granules, size, floor=0.0):
+    """Granules whose centre is behind a wall: x from 0 to size[0], y from 0 to size[1], z above the floor."""
+    x, y, z = granules["x"], granules["y"], granules["z"]
+    return int(((x < 0) | (x > size[0]) | (y < 0) | (y > size[1]) | (z < floor)).sum())
