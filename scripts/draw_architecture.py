@@ -55,7 +55,7 @@ def main():
                 on_way = name in WAY
                 axes.add_patch(FancyBboxPatch((x - width / 2, y - 0.2), width, 0.4, boxstyle="round,pad=0,rounding_size=0.08", fc="white",
                                               ec=ORANGE if on_way else GREY, lw=2 if on_way else 0.8))
-                axes.text(x, y, name, ha="center", va="center", fontsize=8.0 if len(name) > 15 else 8.6, color=INK)
+                axes.text(x, y, name, ha="center", va="center", fontsize=7.4 if len(name) > 14 else 8.6, color=INK)
                 places[name], places_width[name] = (x, y), width
         top -= height + 0.14
     for number, name in enumerate(WAY, 1):
