@@ -46,6 +46,10 @@ struct Column {
     d.meshes = {SmallDeck::floor(0, 0.2)};
     return d;
   }
+  void run(int steps) {
+    world.begin_run(&culling);
+    world.steps(&culling, steps);
+  }
   double weight() const { return 9.81 * world.mass_of(r); }
   double value(int n) { return culling.value(n); }
   double mean_height() const {  // of the atoms
@@ -90,8 +94,7 @@ TEST(Culling, a_column_at_rest_is_culled_after_some_looks_and_stays_where_it_is)
 TEST(Culling, restore_all_returns_everything) {
   SmallWorld world(Column::deck());
   Column column(world);
-  world.begin_run(&column.culling);
-  world.steps(&column.culling, 200);
+  column.run(200);
   ASSERT_GT(column.value(interior), 0);
   column.culling.end_run();
   EXPECT_EQ(world.run.said.size(), 2u);
@@ -106,16 +109,14 @@ TEST(Culling, restore_all_returns_everything) {
   for (int tag = 1; tag <= 12; ++tag)
     EXPECT_EQ(world.atoms.histories(world.at(tag)).size(), tag == 1 || tag == 12 ? 1u : 2u) << tag;
   // and the run goes on without it
-  world.begin_run(&column.culling);
-  world.steps(&column.culling, 3);
+  column.run(3);
   EXPECT_EQ(column.value(exterior), 12);
 }
 
 TEST(Culling, a_blow_wakes_what_it_strikes) {
   SmallWorld world(Column::deck());
   Column column(world);
-  world.begin_run(&column.culling);
-  world.steps(&column.culling, 200);
+  column.run(200);
   ASSERT_EQ(column.value(exterior), 0);
   column.culling.end_run();
   world.add(100, Vec3(0.001, 0.002, column.top + 4 * r), r, Vec3(0, 0, -1));
@@ -139,8 +140,7 @@ TEST(Culling, the_centre_of_mass_of_a_column_that_loses_its_floor_falls_freely) 
   deck.meshes[0].moving = true;
   SmallWorld world(deck);
   Column column(world);
-  world.begin_run(&column.culling);
-  world.steps(&column.culling, 200);
+  column.run(200);
   ASSERT_GT(column.value(culled), 0);
   column.culling.restore_all();
   const double z = column.mean_height();
@@ -233,8 +233,7 @@ TEST(Culling, on_two_ranks_the_same_is_culled_and_all_comes_back) {
 TEST(Culling, the_users_faults_are_input_errors) {
   SmallWorld world(Column::deck());
   Column column(world);
-  world.begin_run(&column.culling);
-  world.steps(&column.culling, 200);
+  column.run(200);
   ASSERT_GT(column.value(interior), 0);
   column.culling.end_run();
   world.contacts.width = 0;  // another contact model while histories wait
@@ -253,8 +252,7 @@ TEST(Culling, the_users_faults_are_input_errors) {
 TEST(Culling, a_granule_inserted_into_the_place_of_a_culled_one_is_an_input_error) {
   SmallWorld world(Column::deck());
   Column column(world);
-  world.begin_run(&column.culling);
-  world.steps(&column.culling, 200);
+  column.run(200);
   ASSERT_EQ(world.at(6), -1);  // stored
   world.insertions.inserted = true;
   world.add(100, Vec3(0.001 + r, 0.002, 11 * r), r);
@@ -277,8 +275,7 @@ TEST(Culling, the_beginning_of_a_run_out_of_order_is_an_internal_error) {
 TEST(Culling, a_hook_of_a_time_step_between_runs_is_an_internal_error) {
   SmallWorld world(Column::deck());
   Column column(world);
-  world.begin_run(&column.culling);
-  world.steps(&column.culling, 20);
+  column.run(20);
   column.culling.end_run();
   // an engine that calls its hooks in another order has forces or lists that are not the step's; a step itself may begin, for
   // `run … pre no` goes on without a setup
@@ -291,8 +288,7 @@ TEST(Culling, a_hook_of_a_time_step_between_runs_is_an_internal_error) {
 TEST(Culling, granules_that_a_deck_makes_between_two_runs_are_counted_at_once) {
   SmallWorld world(Column::deck());
   Column column(world);
-  world.begin_run(&column.culling);
-  world.steps(&column.culling, 20);
+  column.run(20);
   ASSERT_EQ(column.value(exterior) + column.value(interface_granules) + column.value(interior), 12);  // the last line of the run
   const double before = column.value(exterior);
   column.culling.end_run();
