@@ -215,7 +215,7 @@ class MissedPhysics(Case):
     def test_box_that_changes_its_size(self):
         run = self.refused_by_fix(
             deck(FIX, "fix pull all deform 1 z final 0 0.05 units box", "run 0").replace("boundary f f f", "boundary f f p"),
-            "the box changes its size (fix deform, press/berendsen, ...): a culled bed cannot follow; leave that fix out")
+            "fix pull deform: it changes the size of the box, and a culled bed cannot follow; leave one of the two fixes out")
         self.assertEqual(run.errors(run.output), [])
 
     def test_renumbered_granules(self):

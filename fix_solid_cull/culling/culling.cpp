@@ -134,6 +134,16 @@ void Culling::take_neighbours() {
   p_.motion.is_stale();
   lists_are_new();
   if (!p_.solid.has_store()) return;
+  take_arrivals();
+  check_inserted();
+  // the box followed the granules: stored ones go to the rank that has their place now, before anything comes near them
+  if (p_.census.something_stored() && p_.ports.ranks.any(p_.ports.ranks.subdomain_changed()))
+    p_.ports.run.ask_for_reneighbouring(p_.ports.run.step + 1);
+  if (Invariants::asked()) p_.invariants.check();
+}
+
+/// Interface granules may have come from other ranks, or left the box.
+void Culling::take_arrivals() {
   p_.handover.take_over();
   if (p_.lost.forget_lost()) {
     p_.groups.settle();
@@ -142,8 +152,6 @@ void Culling::take_neighbours() {
     p_.motion.is_stale();
   }
   p_.groups.share();
-  check_inserted();
-  if (Invariants::asked()) p_.invariants.check();
 }
 
 void Culling::leave_out_inner_pairs() {
@@ -415,6 +423,9 @@ void Culling::fit_memory() {
 }
 
 void Culling::restore_all() {
+  if (p_.snapshot.waits())
+    throw InputError("the granules that the restart file holds besides the atoms would be lost: put a run, or 'run 0', before " +
+                     ("'unfix " + p_.ports.run.name + "'"));
   if (!p_.solid.has_store()) return;
   p_.ports.contacts.bring_histories_up_to_date();
   p_.ports.ranks.update();
@@ -464,6 +475,22 @@ void Culling::check_inserted() {
 double Culling::largest_radius(int type) const {
   const std::vector<double>& largest = p_.solid.largest_radius_by_type();
   return type >= 0 && type < static_cast<int>(largest.size()) ? largest[static_cast<std::size_t>(type)] : 0.0;
+}
+
+std::vector<double> Culling::restart_state() {
+  // the command write_restart exchanges atoms, and builds no neighbour lists
+  if (phase_ == Phase::beginning && p_.solid.has_store()) take_arrivals();
+  std::vector<double> state = p_.snapshot.write();
+  const std::int64_t interior = state.empty() ? 0 : Snapshot::interior_of(state);
+  if (interior > 0 && (phase_ == Phase::beginning || !told_of_file_))
+    p_.ports.run.say("the restart file holds " + std::to_string(interior) +
+                     " interior granules besides the atoms: a deck that reads it needs a fix solid/cull of the same ID");
+  told_of_file_ = phase_ != Phase::beginning;
+  return state;
+}
+
+void Culling::enclose_stored(Box& box) const {
+  if (p_.solid.has_store()) p_.stored.enclose(box);
 }
 
 double Culling::memory_bytes() const { return static_cast<double>(p_.shell.bytes() + p_.solid.memory_bytes()); }

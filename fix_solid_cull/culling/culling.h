@@ -42,10 +42,11 @@ class Culling {
   // --- state
   double value(int n) { return p_.report.value(n); }                                        ///< f_ID[n + 1]
   const std::map<int, InterfaceMesh>& interface_meshes() { return p_.files.ask_meshes(); }  ///< local
-  double largest_radius(int type) const;                                         ///< of what is or was stored (m). Local
-  double memory_bytes() const;                                                   ///< local
-  std::vector<double> restart_state() { return p_.snapshot.write(); }            ///< on rank 0; the first number is how many
-  void read_restart_state(const double* numbers) { p_.snapshot.read(numbers); }  ///< local
+  double largest_radius(int type) const;  ///< of what is or was stored (m). Local
+  void enclose_stored(Box& box) const;    ///< the box must not be smaller. Local
+  double memory_bytes() const;            ///< local
+  std::vector<double> restart_state();    ///< on rank 0; the first number is how many
+  void read_restart_state(const char* bytes) { p_.snapshot.read(Snapshot::from_bytes(bytes)); }  ///< local
 
   // --- what follows the engine's atoms; local
   const std::vector<FollowsAtoms*>& followers() { return p_.followers; }
@@ -63,6 +64,7 @@ class Culling {
   void expect(std::initializer_list<Phase> phases, const char* where) const;
 
   void find_scales();
+  void take_arrivals();
   void refuse_what_lies_too_far() const;
   void see_walls(bool new_run);
   void take_loads();
@@ -85,6 +87,7 @@ class Culling {
   Proposal proposal_;                // of the last look, until the next change
   bool inner_pairs_listed_ = false;  // the neighbour lists are new: pairs within bodies stand in them
   bool open_for_insertion_ = false;  // a fix will insert: stored granules must make way in the next change
+  bool told_of_file_ = false;        // that restart files of this run hold more than atoms
   bool bodies_are_fast_ = false;     // some body may come too far between two times when ranks talk
   std::int64_t restored_then_ = 0;   // granules restored on this rank until culling was judged last
 };

@@ -38,7 +38,14 @@ class Reader {
   bool more() const { return at_ < end_; }
   double number() { return *numbers(1); }
   std::int64_t whole() { return static_cast<std::int64_t>(number()); }
-  std::size_t count() { return static_cast<std::size_t>(number()); }
+  /// A number of things of which each has at least one number, or of numbers.
+  std::size_t count() { return below(static_cast<std::size_t>(end_ - at_) + 1); }
+  /// An index of something of which there are n.
+  std::size_t below(std::size_t n) {
+    const double x = number();
+    if (!(x >= 0 && x < static_cast<double>(n))) throw InternalError("granules as numbers hold a wrong one");
+    return static_cast<std::size_t>(x);
+  }
   Vec3 vector() { return vec(numbers(3)); }
   const double* numbers(std::size_t n) {
     if (n > static_cast<std::size_t>(end_ - at_)) throw InternalError("granules as numbers end too early");
@@ -158,7 +165,7 @@ std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::s
       g.mass = in.number();
       g.radius = in.number();
       g.held = in.whole() != 0;
-      g.body = static_cast<int>(in.whole());
+      g.body = static_cast<int>(in.below(p.bodies.size()));
       g.place = in.vector();
       g.length = static_cast<int>(in.whole());
       if (g.length != Parcel::no_record) {
@@ -168,7 +175,7 @@ std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::s
         s.radius = g.radius;
         s.position = g.place;
         s.type = static_cast<int>(in.whole());
-        s.layout = layout.at(in.count());
+        s.layout = layout[in.below(layout.size())];
         s.lock_step = in.whole();
         s.normal_load = in.number();
         s.walls = static_cast<int>(in.whole());
@@ -182,7 +189,7 @@ std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::s
     for (std::size_t k = in.count(); k > 0; --k) {
       Parcel::Edge e{in.whole(), 0, 0, {}};
       e.high = in.whole();
-      e.body = static_cast<int>(in.whole());
+      e.body = static_cast<int>(in.below(p.bodies.size()));
       if (in.whole()) {
         const double* h = in.numbers(width);
         e.history.assign(h, h + width);

@@ -47,7 +47,7 @@ class Atoms {
   int own_bit = 0;        ///< the fix's own group
   int movable_bits = 0;   ///< groups that an integrator moves
   int held_bits = 0;      ///< groups that something holds or drives: never culled
-  int gravity_bits = 0;   ///< groups that gravity pulls; 0: there is no gravity
+  int gravity_bits = 0;   ///< groups that gravity pulls, each by a fix of its own; 0: there is no gravity
 
   Vec3 place(int i) const { return vec(x + 3 * std::size_t(i)); }
   Vec3 velocity(int i) const { return vec(v + 3 * std::size_t(i)); }
@@ -63,10 +63,10 @@ class Atoms {
   Sphere sphere(int i) const { return {place(i), radius[i]}; }
   bool is_interface(int i) const { return (groups[i] & interface_bit) != 0; }
   void mark_interface(int i, bool on) { on ? groups[i] |= interface_bit : groups[i] &= ~interface_bit; }
-  /// An integrator moves it, gravity pulls it as it does the others, and nothing else holds or drives it.
+  /// An integrator moves it, all the gravity there is pulls it, and nothing else holds or drives it.
   bool may_be_culled(int i) const {
     const int g = groups[i];
-    return (g & own_bit) && (g & movable_bits) && !(g & held_bits) && (!gravity_bits || (g & gravity_bits));
+    return (g & own_bit) && (g & movable_bits) && !(g & held_bits) && (g & gravity_bits) == gravity_bits;
   }
 
   /// Everything that the engine keeps of owned granule i, as doubles; `layout`: the number of its columns' layout.
@@ -276,6 +276,7 @@ class Run {
   double dt = 0;    ///< s
   double skin = 0;  ///< Verlet skin (m)
   Box box, own;     ///< the whole box, this rank's subdomain
+  Box kept;         ///< what passes its sides is lost; infinite where the box is periodic or follows the granules
   std::array<bool, 3> periodic{};
   std::string name;  ///< the fix's ID
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <string>
 
 #include "input_error.h"
@@ -10,9 +11,35 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261122;  // the format's version
-/// The numbers before the ranks' parcels.
-enum Header { mark, diameter, gravity, gravity_x, counters = gravity_x + 3, width = counters + 4, ranks, header_size };
+constexpr double file_mark = 20261123;  // the format's version
+/// The numbers before the ranks' parcels. A check sum follows them.
+enum Header {
+  mark,
+  size_again,
+  interior,
+  diameter,
+  gravity,
+  gravity_x,
+  counters = gravity_x + 3,
+  width = counters + 4,
+  ranks,
+  header_size
+};
+constexpr std::size_t check_sum_size = 2;
+
+/// Of the numbers' bits (FNV-1a by words), in two halves that doubles hold exactly.
+std::array<double, check_sum_size> check_sum(const double* numbers, std::size_t n) {
+  std::uint64_t sum = 14695981039346656037u;
+  for (std::size_t k = 0; k < n; ++k) {
+    std::uint64_t word;
+    std::memcpy(&word, numbers + k, sizeof word);
+    sum = (sum ^ word) * 1099511628211u;
+    sum ^= sum >> 32;
+  }
+  return {static_cast<double>(sum >> 32), static_cast<double>(sum & 0xffffffffu)};
+}
+
+constexpr const char* damaged = "the restart file is damaged where it holds this fix's granules: use another one";
 
 }  // namespace
 
@@ -31,9 +58,9 @@ std::vector<double> Snapshot::write() {
   const double carves = sums[2];
   ports_.ranks.sum(sums.data(), 4);
   sums[2] = carves;  // every rank counts every carve
-  std::int64_t size = static_cast<std::int64_t>(mine.size());
-  ports_.ranks.sum(&size, 1);
-  size += 1 + header_size;
+  std::int64_t in_file[2] = {static_cast<std::int64_t>(mine.size()), static_cast<std::int64_t>(stored.size())};
+  ports_.ranks.sum(in_file, 2);
+  const std::int64_t size = in_file[0] + 1 + header_size + static_cast<std::int64_t>(check_sum_size);
   constexpr std::int64_t bytes = sizeof(double), gib = std::int64_t{1} << 30;
   if (size * bytes > INT32_MAX)
     throw InputError("the store needs " + std::to_string(size * bytes / gib + 1) +
@@ -45,6 +72,8 @@ std::vector<double> Snapshot::write() {
   state[0] = static_cast<double>(size);
   double* const h = &state[1];
   h[mark] = file_mark;
+  h[size_again] = state[0];
+  h[interior] = static_cast<double>(in_file[1]);
   h[diameter] = scales_.diameter();
   h[gravity] = scales_.gravity();
   set(h + gravity_x, gravity_.at_last_look());
@@ -53,14 +82,32 @@ std::vector<double> Snapshot::write() {
   h[ranks] = ports_.ranks.count;
   state.reserve(static_cast<std::size_t>(size));
   state.insert(state.end(), all.begin(), all.end());
+  const auto sum = check_sum(state.data(), state.size());
+  state.insert(state.end(), sum.begin(), sum.end());
   return state;
 }
 
-void Snapshot::read(const double* numbers) {
-  state_.assign(numbers + 1, numbers + static_cast<std::size_t>(numbers[0]));
-  const double* const h = state_.data();
-  if (state_.size() < header_size || h[mark] != file_mark)
+std::vector<double> Snapshot::from_bytes(const char* bytes) {
+  std::vector<double> state(1 + header_size);
+  std::memcpy(state.data(), bytes, state.size() * sizeof(double));
+  if (state[1 + mark] != file_mark)
     throw InputError("the restart file was written by another version of solidcull: write it again with this one");
+  const double n = state[0];
+  if (!(n >= 1 + header_size + check_sum_size && n <= INT32_MAX / sizeof(double)) || state[1 + size_again] != n)
+    throw InputError(damaged);
+  state.resize(static_cast<std::size_t>(n));
+  std::memcpy(state.data(), bytes, state.size() * sizeof(double));
+  const std::size_t size = state.size() - check_sum_size;
+  const auto sum = check_sum(state.data(), size);
+  if (!std::equal(sum.begin(), sum.end(), state.begin() + static_cast<std::ptrdiff_t>(size))) throw InputError(damaged);
+  return state;
+}
+
+std::int64_t Snapshot::interior_of(const std::vector<double>& state) { return static_cast<std::int64_t>(state[1 + interior]); }
+
+void Snapshot::read(const std::vector<double>& state) {
+  state_.assign(state.begin() + 1, state.end() - check_sum_size);
+  const double* const h = state_.data();
   scales_.set(h[diameter], h[gravity]);
   gravity_.set_at_last_look(vec(h + gravity_x));
   const bool first = ports_.ranks.me == 0;

@@ -1,6 +1,7 @@
 // The culled state in a restart file.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -21,9 +22,12 @@ class Snapshot {
   /// On rank 0 the numbers of the whole state, the first of them how many they are; empty elsewhere. InputError where a restart
   /// file cannot hold them. Collective.
   std::vector<double> write();
-  /// What write() gave: scales, counters and largest radii are known at once, the rest waits for take_up(). InputError for what
-  /// another version wrote. Local.
-  void read(const double* numbers);
+  /// What write() gave, of its bytes, which need not be aligned. InputError for what another version wrote, or what is not what
+  /// was written. Local.
+  static std::vector<double> from_bytes(const char* bytes);
+  static std::int64_t interior_of(const std::vector<double>& state);  ///< granules that it holds besides atoms
+  /// Scales, counters and largest radii are known at once, the rest waits for take_up(). Local.
+  void read(const std::vector<double>& state);
   bool waits() const { return !state_.empty(); }
   /// Once there are atoms. InputError for another contact model. Collective.
   void take_up();

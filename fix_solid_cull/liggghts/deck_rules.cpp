@@ -6,37 +6,16 @@
 #include "domain.h"
 #include "engine_access.h"
 #include "fix_insert.h"
+#include "fix_styles.h"
 #include "force.h"
 #include "input_error.h"
 #include "modify.h"
 #include "pair_gran.h"
+#include "snapshot.h"
 #include "update.h"
 
 namespace solidcull {
 namespace {
-
-bool begins(const LAMMPS_NS::Fix* fix, const char* style) { return std::strncmp(fix->style, style, std::strlen(style)) == 0; }
-
-struct Physics {
-  const char* style;
-  const char* why;
-};
-// physics that culled granules would miss; the styles are prefixes
-constexpr Physics missed[] = {
-    {"heat/gran", "heat conduction would miss the culled granules"},
-    {"couple/", "a coupled solver would miss the culled granules"},
-    {"sph/", "SPH would miss the culled granules"},
-    {"adapt", "radii that change (fix adapt) would leave the culled granules behind"},
-    {"multisphere", "multisphere clumps are not supported yet"},
-    {"rigid", "rigid clumps of granules are not supported yet"},
-    {"nve/asphere", "aspherical granules are not supported"},
-    {"nve/superquadric", "superquadric granules are not supported"},
-    {"deform", "the box changes its size: a culled bed cannot follow"},
-    {"bond", "bonds would miss the culled granules"},
-};
-// what these hold stays where they hold it; what those drive would miss its force
-constexpr const char* holding[] = {"freeze", "setforce", "move", "planeforce", "lineforce", "aveforce"};
-constexpr const char* driving[] = {"addforce", "drag", "efield", "spring", "buoyancy"};
 
 constexpr const char* newton_on = "newton is on: put 'newton off' at the top of the deck";
 
@@ -59,12 +38,12 @@ void DeckRules::refuse_what_was_set_up_wrongly() const {
 
 void DeckRules::refuse_what_cannot_be_culled() const {
   if (force->newton_pair) refuse(newton_on);
+  constexpr int minimizing = 2;
+  if (update->whichflag == minimizing) refuse("minimize would move atoms only: unfix " + std::string(own_->id) + " first");
   if (std::strstr(update->integrate_style, "verlet") == nullptr)
     refuse("run_style '" + std::string(update->integrate_style) + "' is not supported: use run_style verlet");
   if (!force->pair || std::strncmp(force->pair_style, "gran", 4) != 0)
     refuse("pair_style '" + std::string(force->pair_style) + "' is not granular: use pair_style gran");
-  if (domain->box_change_size || domain->box_change_shape)
-    refuse("the box changes its size (fix deform, press/berendsen, ...): a culled bed cannot follow; leave that fix out");
   if (static_cast<const LAMMPS_NS::PairGran*>(force->pair)->storeContactForces())
     refuse("contact forces are stored per contact (store_force_contact): those of culled granules would be missing");
   refuse_physics_that_would_miss_granules();
@@ -74,9 +53,12 @@ void DeckRules::refuse_physics_that_would_miss_granules() const {
   for (int f = 0; f < modify->nfix; ++f) {
     const LAMMPS_NS::Fix* fix = modify->fix[f];
     const std::string name = "fix " + std::string(fix->id) + " " + fix->style + ": ";
-    for (const Physics& p : missed)
-      if (begins(fix, p.style)) refuse(name + p.why + "; leave one of the two fixes out");
-    if (begins(fix, "insert/") && engine::compresses_tags(*static_cast<const LAMMPS_NS::FixInsert*>(fix)))
+    const FixStyle& style = treatment_of(fix->style);
+    if (style.treatment == Treatment::refused) refuse(name + style.why + "; leave one of the two fixes out");
+    if (fix->box_change_size || fix->box_change_shape)  // a style that is not LIGGGHTS's own
+      refuse(name + "it changes the size of the box, and a culled bed cannot follow; leave one of the two fixes out");
+    const auto* insertion = dynamic_cast<const LAMMPS_NS::FixInsert*>(fix);
+    if (insertion && engine::compresses_tags(*insertion))
       refuse(name + "compress_tags would renumber granules that are culled; say 'compress_tags no'");
   }
 }
@@ -86,17 +68,43 @@ void DeckRules::find_movable(EngineAtoms& atoms, const Run& run) const {
   atoms.movable_bits = atoms.held_bits = atoms.gravity_bits = 0;
   for (int f = 0; f < modify->nfix; ++f) {
     const LAMMPS_NS::Fix* fix = modify->fix[f];
-    if (begins(fix, "nve")) atoms.movable_bits |= fix->groupbit;
-    if (begins(fix, "gravity")) atoms.gravity_bits |= fix->groupbit;
-    for (const char* style : holding)
-      if (begins(fix, style) && !begins(fix, "move/mesh")) atoms.held_bits |= fix->groupbit;
-    for (const char* style : driving)
-      if (begins(fix, style)) {
+    if (std::strcmp(fix->style, own_->style) == 0) continue;
+    if (std::strcmp(fix->style, "gravity") == 0) atoms.gravity_bits |= fix->groupbit;
+    const FixStyle& style = treatment_of(fix->style);
+    switch (style.treatment) {
+      case Treatment::integrates:
+        atoms.movable_bits |= fix->groupbit;
+        break;
+      case Treatment::drives:
+        run.say("fix " + std::string(fix->id) + " (" + fix->style + ") " + style.why + ": granules of its group are not culled");
         atoms.held_bits |= fix->groupbit;
-        run.say("fix " + std::string(fix->id) + " (" + fix->style +
-                ") adds forces that culled granules would miss: granules of its group are not culled");
-      }
+        break;
+      case Treatment::holds:
+        atoms.held_bits |= fix->groupbit;
+        break;
+      default:
+        break;
+    }
   }
+}
+
+std::string state_that_no_fix_has(LAMMPS_NS::Modify& modify) {
+  for (const engine::RestartState& state : engine::restart_states(modify)) {
+    if (state.style != "solid/cull") continue;
+    const int f = modify.find_fix(state.id.c_str());
+    if (f >= 0 && state.style == modify.fix[f]->style) continue;
+    const std::string name = "fix " + state.id + " solid/cull: ";
+    try {
+      const std::int64_t interior = Snapshot::interior_of(Snapshot::from_bytes(state.bytes));
+      if (interior > 0)
+        return name + "the restart file holds " + std::to_string(interior) +
+               " granules of this fix besides the atoms, and they would be lost now: put 'fix " + state.id +
+               " GROUP solid/cull ...' right after read_restart and the pair_style";
+    } catch (const InputError& e) {
+      return name + e.what();
+    }
+  }
+  return "";
 }
 
 }  // namespace solidcull

@@ -25,4 +25,8 @@ class DeckRules : protected LAMMPS_NS::Pointers {
   const LAMMPS_NS::Fix* own_;
 };
 
+/// One line on granules in a restart file that no fix of the deck has taken up; empty where there are none. Local, alike on all
+/// ranks.
+std::string state_that_no_fix_has(LAMMPS_NS::Modify& modify);
+
 }  // namespace solidcull

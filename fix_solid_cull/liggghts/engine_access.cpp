@@ -35,6 +35,9 @@ struct Expose {
 
 using FixStyles = std::map<std::string, FixCreator>;
 SOLIDCULL_EXPOSE(ModifyFixMap, Modify, FixStyles*, fix_map)
+SOLIDCULL_EXPOSE(ModifyStateIds, Modify, char**, id_restart_global)
+SOLIDCULL_EXPOSE(ModifyStateStyles, Modify, char**, style_restart_global)
+SOLIDCULL_EXPOSE(ModifyStates, Modify, char**, state_restart_global)
 SOLIDCULL_EXPOSE(HistoryNewton, FixContactHistory, int*, newtonflag_)
 SOLIDCULL_EXPOSE(HistoryNames, FixContactHistory, char**, history_id_)
 SOLIDCULL_EXPOSE(HistoryCounts, FixContactHistory, int*, npartner_)
@@ -69,6 +72,14 @@ SOLIDCULL_EXPOSE(SameTagAtoms, Atom, int, smax)
 #undef SOLIDCULL_EXPOSE
 
 std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify) { return *(modify.*member(ModifyFixMap())); }
+
+std::vector<RestartState> restart_states(const LAMMPS_NS::Modify& modify) {
+  std::vector<RestartState> states;
+  for (int s = 0; s < modify.nfix_restart_global; ++s)
+    states.push_back(
+        {(modify.*member(ModifyStateIds()))[s], (modify.*member(ModifyStateStyles()))[s], (modify.*member(ModifyStates()))[s]});
+  return states;
+}
 
 const int* history_newton_flags(const LAMMPS_NS::FixContactHistory& fix) { return fix.*member(HistoryNewton()); }
 

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 namespace LAMMPS_NS {
 class Atom;
@@ -31,6 +32,13 @@ Function own(const char* mangled) {
 
 /// The engine's table of fix styles.
 std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify);
+
+/// What a restart file holds for a fix, until the first run begins.
+struct RestartState {
+  std::string id, style;
+  const char* bytes;
+};
+std::vector<RestartState> restart_states(const LAMMPS_NS::Modify& modify);
 
 /// Per history number: 1 if it changes sign with the side it is seen from.
 const int* history_newton_flags(const LAMMPS_NS::FixContactHistory& fix);

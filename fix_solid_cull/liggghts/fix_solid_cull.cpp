@@ -1,6 +1,8 @@
 #include "fix_solid_cull.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <exception>
 #include <thread>
 #include <vector>
@@ -78,8 +80,12 @@ void FixSolidCull::refuse(const std::string& why) {
 }
 
 void FixSolidCull::broken(const std::string& what) {
-  const std::string line = "fix " + std::string(id) + " solid/cull: internal error on rank " + std::to_string(comm->me) +
-                           " at step " + std::to_string(update->ntimestep) + ": " + what + "; please report it with the deck";
+  fail("internal error on rank " + std::to_string(comm->me) + " at step " + std::to_string(update->ntimestep) + ": " + what +
+       "; please report it with the deck");
+}
+
+void FixSolidCull::fail(const std::string& why) {
+  const std::string line = "fix " + std::string(id) + " solid/cull: " + why;
   std::fprintf(stderr, "ERROR: %s\n", line.c_str());  // MPI_Abort drops what is buffered
   std::fflush(nullptr);
   error->one(__FILE__, __LINE__, line.c_str());
@@ -92,9 +98,8 @@ void FixSolidCull::renew() {
 }
 
 template <class Work>
-auto FixSolidCull::hand_on(Work work) -> decltype(work()) {
+auto FixSolidCull::guarded(Work work) -> decltype(work()) {
   try {
-    renew();
     return work();
   } catch (const InputError& e) {
     refuse(e.what());
@@ -102,6 +107,14 @@ auto FixSolidCull::hand_on(Work work) -> decltype(work()) {
     broken(e.what());
   }
   std::abort();  // both end the program
+}
+
+template <class Work>
+auto FixSolidCull::hand_on(Work work) -> decltype(work()) {
+  return guarded([&] {
+    renew();
+    return work();
+  });
 }
 
 // ------------------------------------------------------------------------------------------------------------ a run begins
@@ -121,7 +134,7 @@ void FixSolidCull::setup_pre_exchange() {
 }
 
 void FixSolidCull::setup_pre_force(int vflag) {
-  culling_->lists_are_new();
+  guarded([&] { culling_->lists_are_new(); });
   pre_force(vflag);
 }
 
@@ -181,7 +194,21 @@ double FixSolidCull::compute_vector(int n) {
   return hand_on([&] { return culling_->value(n); });
 }
 
-double FixSolidCull::memory_usage() { return culling_->memory_bytes(); }
+double FixSolidCull::memory_usage() {
+  return guarded([&] { return culling_->memory_bytes(); });
+}
+
+double FixSolidCull::max_rad(int type) {
+  return guarded([&] { return culling_->largest_radius(type); });
+}
+
+/// A box that follows the granules (boundary m, s) follows stored ones too.
+void FixSolidCull::box_extent(double& xlo, double& xhi, double& ylo, double& yhi, double& zlo, double& zhi) {
+  Box box{{xlo, ylo, zlo}, {xhi, yhi, zhi}};
+  guarded([&] { culling_->enclose_stored(box); });
+  xlo = box.lo[0], ylo = box.lo[1], zlo = box.lo[2];
+  xhi = box.hi[0], yhi = box.hi[1], zhi = box.hi[2];
+}
 
 const std::map<int, InterfaceMesh>& FixSolidCull::interface_meshes() {
   using Meshes = std::map<int, InterfaceMesh>;
@@ -205,35 +232,45 @@ int FixSolidCull::max_type() {
 // ------------------------------------------------------------------------------------------------------------ per atom
 
 void FixSolidCull::grow_arrays(int nmax) {
-  for (FollowsAtoms* f : culling_->followers()) f->grow(nmax);
+  guarded([&] {
+    for (FollowsAtoms* f : culling_->followers()) f->grow(nmax);
+  });
   vector_atom = culling_->labels();
 }
 
 void FixSolidCull::copy_arrays(int from, int to, int) {
-  for (FollowsAtoms* f : culling_->followers()) f->copy(from, to);
+  guarded([&] {
+    for (FollowsAtoms* f : culling_->followers()) f->copy(from, to);
+  });
 }
 
 void FixSolidCull::set_arrays(int i) {
-  for (FollowsAtoms* f : culling_->followers()) f->reset(i);
+  guarded([&] {
+    for (FollowsAtoms* f : culling_->followers()) f->reset(i);
+  });
 }
 
 int FixSolidCull::pack_exchange(int i, double* buffer) {
-  int n = 0;
-  for (const FollowsAtoms* f : culling_->followers()) {
-    f->pack(i, buffer + n);
-    n += f->packed_size();
-  }
-  return n;
+  return guarded([&] {
+    int n = 0;
+    for (const FollowsAtoms* f : culling_->followers()) {
+      f->pack(i, buffer + n);
+      n += f->packed_size();
+    }
+    return n;
+  });
 }
 
 int FixSolidCull::unpack_exchange(int i, double* buffer) {
-  int n = 0;
-  for (FollowsAtoms* f : culling_->followers()) {
-    f->unpack(i, buffer + n);
-    n += f->packed_size();
-  }
-  culling_->arrived_from_another_rank(i);
-  return n;
+  return guarded([&] {
+    int n = 0;
+    for (FollowsAtoms* f : culling_->followers()) {
+      f->unpack(i, buffer + n);
+      n += f->packed_size();
+    }
+    culling_->arrived_from_another_rank(i);
+    return n;
+  });
 }
 
 // ------------------------------------------------------------------------------------------------------------ restart
@@ -254,28 +291,28 @@ void FixSolidCull::unpack_restart(int i, int nth) {
   int at = 0;
   for (int k = 0; k < nth; ++k) at += static_cast<int>(extra[at]);
   ++at;
-  for (FollowsAtoms* f : culling_->followers()) {
-    f->unpack(i, extra + at);
-    at += f->packed_size();
-  }
-  culling_->read_from_file(i);
+  guarded([&] {
+    for (FollowsAtoms* f : culling_->followers()) {
+      f->unpack(i, extra + at);
+      at += f->packed_size();
+    }
+    culling_->read_from_file(i);
+  });
 }
 
 void FixSolidCull::write_restart(FILE* file) {
   const std::vector<double> state = hand_on([&] { return culling_->restart_state(); });
   if (comm->me != 0) return;
   const int bytes = static_cast<int>(state.size() * sizeof(double));
-  std::fwrite(&bytes, sizeof(int), 1, file);
-  std::fwrite(state.data(), sizeof(double), state.size(), file);
+  const bool written = std::fwrite(&bytes, sizeof(int), 1, file) == 1 &&
+                       std::fwrite(state.data(), sizeof(double), state.size(), file) == state.size() && std::fflush(file) == 0;
+  if (!written)
+    fail("the restart file could not be written (" + std::string(std::strerror(errno)) +
+         "): it is not whole, delete it; make room, or write it elsewhere");
 }
 
 void FixSolidCull::restart(char* buffer) {
-  // the engine's buffer need not be aligned for doubles
-  double numbers = 0;
-  std::copy_n(buffer, sizeof numbers, reinterpret_cast<char*>(&numbers));
-  std::vector<double> state(static_cast<std::size_t>(numbers));
-  std::copy_n(buffer, state.size() * sizeof(double), reinterpret_cast<char*>(state.data()));
-  hand_on([&] { culling_->read_restart_state(state.data()); });
+  hand_on([&] { culling_->read_restart_state(buffer); });
 }
 
 }  // namespace solidcull

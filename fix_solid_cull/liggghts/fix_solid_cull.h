@@ -45,7 +45,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   double compute_scalar() override;
   double compute_vector(int n) override;
   double memory_usage() override;
-  double max_rad(int type) override { return culling_->largest_radius(type); }
+  void box_extent(double& xlo, double& xhi, double& ylo, double& yhi, double& zlo, double& zhi) override;
+  double max_rad(int type) override;
   int min_type() override;
   int max_type() override;
 
@@ -64,12 +65,16 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   const std::map<int, InterfaceMesh>& interface_meshes() override;
 
  private:
-  /// The ports are renewed, then the work is done; what goes wrong ends in one line, not in a stack trace.
+  /// What goes wrong ends in one line, not in a stack trace.
+  template <class Work>
+  auto guarded(Work work) -> decltype(work());
+  /// Likewise, and the ports are renewed before.
   template <class Work>
   auto hand_on(Work work) -> decltype(work());
   void renew();
   void refuse(const std::string& why);   // the user's fault; collective
   void broken(const std::string& what);  // ours; local
+  void fail(const std::string& why);     // ends the run; local
   void publish_flags();
 
   EngineAtoms atoms_;

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <string>
 
+#include "deck_rules.h"
 #include "domain.h"
 #include "engine_access.h"
 #include "error.h"
@@ -43,6 +44,15 @@ void Modify::add_fix(int narg, char** arg, char* suffix) {
   static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Modify7add_fixEiPPcS1_");
   solidcull::engine::fix_styles(*this)["solid/cull"] = make_fix;
   original(this, narg, arg, suffix);
+}
+
+/// The engine forgets here what a restart file holds for fixes that the deck has not made: culled granules would be lost.
+void Modify::init() {
+  using Original = void (*)(Modify*);
+  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Modify4initEv");
+  const std::string lost = solidcull::state_that_no_fix_has(*this);
+  if (!lost.empty()) error->all(FLERR, lost.c_str());
+  original(this);
 }
 
 void Domain::add_region(int narg, char** arg) {

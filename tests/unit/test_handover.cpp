@@ -211,7 +211,7 @@ struct File {
       const int i = w.atoms.put_back(a.record, 0);
       for (std::size_t f = 0; f < a.followers.size(); ++f) w.atoms.followers[f]->unpack(i, a.followers[f].data());
     }
-    parts.snapshot.read(state.data());
+    parts.snapshot.read(Snapshot::from_bytes(reinterpret_cast<const char*>(state.data())));
     EXPECT_TRUE(parts.snapshot.waits());
     parts.snapshot.take_up();
     EXPECT_FALSE(parts.snapshot.waits());
@@ -278,12 +278,38 @@ TEST(Snapshot, the_users_faults_are_named) {
   });
   SmallWorld world(ranks_along_x(1));
   WorldParts parts(world, sleeping_settings(), 2 * r);
-  parts.snapshot.read(file.state.data());
+  parts.snapshot.read(file.state);
   world.contacts.width = 0;  // another contact model
   parts.solid.set_histories(world.contacts.flips(), world.contacts.vectors());
   EXPECT_THROW(parts.snapshot.take_up(), InputError);
-  file.state[1] += 1;  // another version
-  EXPECT_THROW(parts.snapshot.read(file.state.data()), InputError);
+}
+
+TEST(Snapshot, numbers_that_are_not_those_that_were_written_are_refused) {
+  File file;
+  run_on_ranks(ranks_along_x(1), [&](SmallWorld& w) {
+    Block block(w, -0.03);
+    file.write(w, block.parts);
+  });
+  const auto read = [&](const std::vector<double>& state) {
+    std::vector<char> bytes(state.size() * sizeof(double) + 1);  // not aligned, as in the engine's buffer
+    std::memcpy(&bytes[1], state.data(), bytes.size() - 1);
+    return Snapshot::from_bytes(&bytes[1]);
+  };
+  EXPECT_EQ(read(file.state), file.state);
+  EXPECT_EQ(Snapshot::interior_of(file.state), 10);
+  // sizes that would have it read elsewhere: the one number alone, and both
+  for (const double wrong : {-1.0, 0.0, 3.5, 1e300, std::nan(""), file.state[0] + 1, file.state[0] - 1}) {
+    std::vector<double> state = file.state;
+    state[0] = wrong;
+    EXPECT_THROW(read(state), InputError) << wrong;
+  }
+  // any other number, in any way
+  for (std::size_t k = 1; k < file.state.size(); ++k)
+    for (const double wrong : {file.state[k] + 1, -1e9, std::nan("")}) {
+      std::vector<double> state = file.state;
+      state[k] = wrong;
+      EXPECT_THROW(read(state), InputError) << k << " " << wrong;
+    }
 }
 
 }  // namespace
