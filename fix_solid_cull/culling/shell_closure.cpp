@@ -243,9 +243,7 @@ std::size_t ShellClosure::fetch_what_is_near(bool open_for_insertion) {
 std::size_t ShellClosure::fetch_from_outside() {
   const Run& run = ports_.run;
   const auto outside = [&](const Vec3& x, double margin) {
-    for (int d = 0; d < 3; ++d)
-      if (!run.periodic[d] && (x[d] - margin < run.box.lo[d] || x[d] + margin >= run.box.hi[d])) return true;
-    return false;
+    return (x.array() - margin < run.kept.lo.array()).any() || (x.array() + margin >= run.kept.hi.array()).any();
   };
   std::vector<std::int64_t> leaving;
   solid_.store().for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {

@@ -49,6 +49,16 @@ class StoredSearch {
     });
   }
 
+  /// The box grows until the centres of all are in it.
+  void enclose(Box& box) const {
+    solid_.store().for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
+      const Pose& pose = solid_.pose_of_frame(frame);
+      const Vec3 middle = pose.to_world(0.5 * (lo + hi)), half = turned_half_box(pose.turn(), 0.5 * (hi - lo));
+      box.lo = box.lo.cwiseMin(middle - half);
+      box.hi = box.hi.cwiseMax(middle + half);
+    });
+  }
+
   /// How far outside its subdomain a rank may hold a stored granule.
   double slack() const { return ranks_.count > 1 && scales_.rigid() ? scales_.diameter() : 0.0; }
 

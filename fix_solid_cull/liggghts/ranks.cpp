@@ -2,7 +2,9 @@
 
 #include <mpi.h>
 
+#include <algorithm>
 #include <cstring>
+#include <limits>
 
 #include "comm.h"
 #include "domain.h"
@@ -52,14 +54,22 @@ void EngineRanks::largest(std::int64_t* numbers, int n) const {
   if (count > 1) MPI_Allreduce(MPI_IN_PLACE, numbers, n, MPI_INT64_T, MPI_MAX, world);
 }
 
-void EngineRanks::update() {
-  double mine[6];
+/// A side of the box that is not periodic may follow the granules, and the rank at it owns what lies beyond.
+std::array<double, 6> EngineRanks::own_borders() const {
+  constexpr double no_border = std::numeric_limits<double>::infinity();
+  std::array<double, 6> own;
   for (int d = 0; d < 3; ++d) {
-    mine[d] = domain->sublo[d];
-    mine[3 + d] = domain->subhi[d];
+    const bool periodic = domain->boundary[d][0] == 0;
+    own[d] = !periodic && domain->sublo[d] <= domain->boxlo[d] ? -no_border : domain->sublo[d];
+    own[3 + d] = !periodic && domain->subhi[d] >= domain->boxhi[d] ? no_border : domain->subhi[d];
   }
+  return own;
+}
+
+void EngineRanks::update() {
+  const std::array<double, 6> mine = own_borders();
   boxes_.resize(6 * static_cast<std::size_t>(count));
-  MPI_Allgather(mine, 6, MPI_DOUBLE, boxes_.data(), 6, MPI_DOUBLE, world);
+  MPI_Allgather(mine.data(), 6, MPI_DOUBLE, boxes_.data(), 6, MPI_DOUBLE, world);
 
   shifts_.assign(1, Vec3::Zero());
   const bool periodic[3] = {domain->xperiodic != 0, domain->yperiodic != 0, domain->zperiodic != 0};
@@ -74,10 +84,8 @@ void EngineRanks::update() {
 
 bool EngineRanks::subdomain_changed() const {
   if (boxes_.empty()) return true;
-  const double* mine = &boxes_[6 * static_cast<std::size_t>(me)];
-  for (int d = 0; d < 3; ++d)
-    if (mine[d] != domain->sublo[d] || mine[3 + d] != domain->subhi[d]) return true;
-  return false;
+  const std::array<double, 6> now = own_borders();
+  return !std::equal(now.begin(), now.end(), &boxes_[6 * static_cast<std::size_t>(me)]);
 }
 
 bool EngineRanks::owns(const Vec3& place) const {

@@ -1,6 +1,7 @@
 // MPI ranks and periodic images, as LIGGGHTS divides the box among them.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "pointers.h"
@@ -29,6 +30,8 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
   void gather_bytes(const void* rows, std::size_t n, std::size_t bytes, bool everywhere, const Room& room) const override;
 
  private:
+  std::array<double, 6> own_borders() const;  // lo, hi
+
   std::vector<double> boxes_;  // six per rank: lo, hi
   std::vector<Vec3> shifts_{Vec3::Zero()};
   bool has_neighbours_ = false;

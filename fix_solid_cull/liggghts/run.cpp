@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <cstring>
+#include <limits>
 
 #include "comm.h"
 #include "domain.h"
@@ -19,6 +20,12 @@ void EngineRun::renew() {
   box = {vec(domain->boxlo), vec(domain->boxhi)};
   own = {vec(domain->sublo), vec(domain->subhi)};
   periodic = {domain->xperiodic != 0, domain->yperiodic != 0, domain->zperiodic != 0};
+  constexpr int fixed = 1;  // of Domain::boundary
+  constexpr double never = std::numeric_limits<double>::infinity();
+  for (int d = 0; d < 3; ++d) {
+    kept.lo[d] = domain->boundary[d][0] == fixed ? box.lo[d] : -never;
+    kept.hi[d] = domain->boundary[d][1] == fixed ? box.hi[d] : never;
+  }
 }
 
 Vec3 EngineRun::gravity() const {

@@ -732,6 +732,12 @@ SmallWorld::SmallWorld(const SmallDeck& its_deck, Meeting* meeting, int rank, in
   run.box = deck.box;
   run.own = subdomain(rank);
   run.periodic = deck.periodic;
+  run.kept = deck.box;
+  for (int d = 0; d < 3; ++d)
+    if (deck.periodic[static_cast<std::size_t>(d)]) {
+      run.kept.lo[d] = -HUGE_VAL;
+      run.kept.hi[d] = HUGE_VAL;
+    }
   run.name = "cull";
   if (deck.gravity.isZero(0)) atoms.gravity_bits = 0;
   ranks.update();

@@ -297,6 +297,22 @@ TEST(ShellClosure, what_leaves_the_box_becomes_an_atom) {
   EXPECT_EQ(row.stored(), all_but(10, {8, 9, 10}));
 }
 
+TEST(ShellClosure, a_box_that_follows_the_granules_holds_what_is_stored) {
+  Row row;
+  row.world.run.kept = {Vec3::Constant(-HUGE_VAL), Vec3::Constant(HUGE_VAL)};
+  row.parts.put_away(row.tags);
+  row.parts.solid.body(row.parts.body_of(1)).shift(Vec3(1 - 0.065, 0, 0));
+  EXPECT_EQ(row.parts.closure.fetch_from_outside(), 0u);
+  Box box{Vec3(-0.5, 0, 0), Vec3(0.5, 0.25, 0)};
+  row.parts.stored.enclose(box);
+  double farthest = -HUGE_VAL;
+  row.parts.solid.store().for_each([&](const Resident& g) { farthest = std::max(farthest, row.parts.solid.in_world(g)[0]); });
+  EXPECT_GT(farthest, 1);
+  EXPECT_NEAR(box.hi[0], farthest, 1e-12);
+  EXPECT_EQ(box.lo[0], -0.5);
+  EXPECT_EQ(box.hi[1], 0.25);
+}
+
 TEST(ShellClosure, a_look_asks_for_a_rebuild_when_enough_might_go) {
   for (const int granules : {10, 11}) {
     Row row(empty_space(), granules);

@@ -26,7 +26,9 @@ TEST(TagIndex, finds_what_was_set_among_many_tags_and_among_few) {
       const std::int64_t other = static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(highest + 500));
       const auto known = expected.find(other);
       ASSERT_EQ(index.contains(other), known != expected.end()) << other;
-      if (known != expected.end()) ASSERT_EQ(*index.find(other), known->second);
+      if (known != expected.end()) {
+        ASSERT_EQ(*index.find(other), known->second);
+      }
     }
     for (const auto& [tag, at] : expected) ASSERT_EQ(*index.find(tag), at);
   }
