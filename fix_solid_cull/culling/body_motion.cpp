@@ -100,11 +100,11 @@ void BodyMotion::take_loads() {
 
 void BodyMotion::sum_over_ranks() {
   if (groups_.spanning_bodies() == 0) return;
-  constexpr int numbers = 9;
+  constexpr std::size_t numbers = 9;
   std::vector<double> sums(numbers * groups_.spanning_bodies(), 0.0);
   for (const ActiveBody& a : active_) {
     if (a.spanning < 0) continue;
-    double* of = &sums[static_cast<std::size_t>(numbers * a.spanning)];
+    double* of = &sums[numbers * static_cast<std::size_t>(a.spanning)];
     for (int d = 0; d < 3; ++d) {
       of[d] += a.force[d];
       of[3 + d] += a.torque[d];
@@ -114,7 +114,7 @@ void BodyMotion::sum_over_ranks() {
   ports_.ranks.sum(sums.data(), static_cast<int>(sums.size()));
   for (ActiveBody& a : active_) {
     if (a.spanning < 0) continue;
-    const double* of = &sums[static_cast<std::size_t>(numbers * a.spanning)];
+    const double* of = &sums[numbers * static_cast<std::size_t>(a.spanning)];
     a.force = vec(of);
     a.torque = vec(of + 3);
     a.change = vec(of + 6);

@@ -69,7 +69,7 @@ class BodyMotion : public BodyFollower {
  private:
   struct FieldInFrame;
   std::vector<FieldInFrame> fields() const;
-  void give_velocity(std::size_t k, const std::vector<FieldInFrame>& fields);
+  void give_velocity(std::size_t k, const std::vector<FieldInFrame>& of);
   void add_to_body(std::size_t k, const Vec3& contact, const Vec3& torque);
   void sum_over_ranks();
   double way_in_a_step(const ActiveBody& a) const;

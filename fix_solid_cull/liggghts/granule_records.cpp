@@ -1,6 +1,7 @@
 #include "granule_records.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <sstream>
 
@@ -11,6 +12,12 @@
 
 namespace solidcull {
 namespace {
+
+std::uint64_t bits(double x) {
+  std::uint64_t word;
+  std::memcpy(&word, &x, sizeof word);
+  return word;
+}
 
 /// AtomVec packs its own columns and then every fix's; with no fixes named it packs its own alone.
 class AtomStyleOnly {
@@ -94,7 +101,7 @@ std::vector<int> GranuleRecords::motion_words(int i, bool positions) {
     atom->avec->pack_exchange(i, after.data());
     *number = kept;
     for (int w = 0; w < length; ++w)
-      if (std::memcmp(&before[w], &after[w], sizeof(double)) != 0) words.push_back(w);
+      if (bits(before[w]) != bits(after[w])) words.push_back(w);
   }
   std::sort(words.begin(), words.end());
   return words;
