@@ -19,7 +19,7 @@ class EngineRun : public Run, protected LAMMPS_NS::Pointers {
 
   Vec3 gravity() const override;
   Vec3 wrapped(const Vec3& place) const override;
-  bool ask_for_reneighbouring(std::int64_t step) override;
+  bool ask_for_reneighbouring(std::int64_t at) override;
   void say(const std::string& line) const override;
 
  private:

@@ -311,7 +311,7 @@ class GranuleStore {
   void unseat(int s, int frame);
   void join(int body, const Vec3& position);
   void leave(int body);
-  void relocate(int s, int body, const Vec3& position);
+  void relocate(int s, int body, const Vec3& place);
 
   // the table of tags
   int slot_of(std::int64_t tag) const;
