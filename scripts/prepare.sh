@@ -39,7 +39,7 @@ if command -v dpkg-query >/dev/null; then
   fi
 fi
 
-cores=$(nproc)
+cores=$(env -u OMP_NUM_THREADS nproc)  # nproc would take OMP_NUM_THREADS for the number of cores
 free_gib=$(awk '/^MemAvailable/ {print int($2 / 1048576)}' /proc/meminfo)
 jobs=$((free_gib / gib_per_job))
 [ "$jobs" -gt "$cores" ] && jobs=$cores
