@@ -90,6 +90,13 @@ struct SmallDeck {
   static Plane ground(double z, const std::string& name = "ground") { return {name, Vec3(0, 0, z), Vec3(0, 0, 1)}; }
 };
 
+/// No walls, no gravity.
+inline SmallDeck empty_space() {
+  SmallDeck deck;
+  deck.gravity = Vec3::Zero();
+  return deck;
+}
+
 class SmallAtoms : public Atoms {
  public:
   static constexpr int all_bit = 1, interface_group = 2, held_group = 4;

@@ -13,12 +13,6 @@ namespace {
 constexpr double r = 0.005;  // m
 constexpr double apart = 0.999 * 2 * r;
 
-SmallDeck empty_space() {
-  SmallDeck deck;
-  deck.gravity = Vec3::Zero();
-  return deck;
-}
-
 /// A cube of n x n x n granules in `exterior live` with a cover of two diameters.
 struct Cube {
   static constexpr int n = 7;

@@ -7,12 +7,6 @@ namespace {
 
 constexpr double r = 0.005;  // m
 
-SmallDeck empty_space() {
-  SmallDeck deck;
-  deck.gravity = Vec3::Zero();
-  return deck;
-}
-
 /// Two rows of four, each a body; of the first the inner two are stored.
 struct TwoBodies {
   explicit TwoBodies(const Vec3& velocity = Vec3::Zero()) : world(empty_space()), parts(world, sleeping_settings(), 2 * r) {

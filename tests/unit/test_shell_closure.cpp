@@ -10,12 +10,6 @@ namespace {
 constexpr double r = 0.005;  // m
 using Tags = std::set<std::int64_t>;
 
-SmallDeck empty_space() {
-  SmallDeck deck;
-  deck.gravity = Vec3::Zero();
-  return deck;
-}
-
 /// Ten granules along x that are one body.
 struct Row {
   explicit Row(const SmallDeck& deck = empty_space(), int granules = 10) : world(deck), parts(world, sleeping_settings(), 2 * r) {

@@ -11,12 +11,6 @@ namespace {
 
 constexpr double r = 0.005;  // m
 
-SmallDeck empty_space() {
-  SmallDeck deck;
-  deck.gravity = Vec3::Zero();
-  return deck;
-}
-
 TEST(SmallWorld, a_granule_falls_as_galilei_says) {
   SmallWorld world{SmallDeck()};
   world.add(1, Vec3::Zero(), r);

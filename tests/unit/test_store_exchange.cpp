@@ -9,12 +9,6 @@ namespace {
 
 constexpr double r = 0.005;  // m
 
-SmallDeck empty_space() {
-  SmallDeck deck;
-  deck.gravity = Vec3::Zero();
-  return deck;
-}
-
 /// What is true of a granule that is an atom.
 struct State {
   Vec3 place, velocity, spin;
