@@ -13,7 +13,9 @@ class Census {
   Census(const Ports& ports, const Solid& solid) : ports_(ports), solid_(solid) {}
 
   bool something_stored() const { return stored_ > 0; }
+  std::int64_t stored() const { return stored_; }
   bool something_locked() const { return locked_ > 0; }
+  std::int64_t locked() const { return locked_; }
   bool several_bodies() const { return bodies_ > 1; }  ///< with one alone, none can come near another
 
   /// Collective.

@@ -82,6 +82,7 @@ void Culling::find_scales() {
 
 void Culling::set_up_atoms() {
   expect({Phase::beginning}, "set_up_atoms");
+  if (p_.shown.shown()) return;  // no run: a command of the deck sets up what it needs
   find_scales();
   if (!p_.solid.has_store()) return;
   // a restart file keeps groups: marks of granules that this fix does not hold would hide their contacts
@@ -90,7 +91,10 @@ void Culling::set_up_atoms() {
   if (p_.snapshot.waits()) {
     p_.snapshot.take_up();
     count_restored();
+    p_.shown.show();  // this deck may hold or drive what the one before did not
+    p_.shown.hide();
   }
+  take_changes();
   p_.closure.begin_run();
   open_for_insertion();
   change();
@@ -145,13 +149,15 @@ void Culling::take_neighbours() {
 /// Interface granules may have come from other ranks, or left the box.
 void Culling::take_arrivals() {
   p_.handover.take_over();
-  if (p_.lost.forget_lost()) {
-    p_.groups.settle();
-    p_.census.count_bodies();
-    label_bodies(p_.ports.atoms, p_.shell, p_.groups);
-    p_.motion.is_stale();
-  }
+  if (p_.lost.forget_lost()) settle_bodies();
   p_.groups.share();
+}
+
+void Culling::settle_bodies() {
+  p_.groups.settle();
+  p_.census.count_bodies();
+  label_bodies(p_.ports.atoms, p_.shell, p_.groups);
+  p_.motion.is_stale();
 }
 
 void Culling::leave_out_inner_pairs() {
@@ -230,6 +236,40 @@ void Culling::end_run() {
 /// The only place where the rebuilds that this fix asks for are counted.
 void Culling::ask_for_build(std::int64_t step) {
   if (p_.ports.run.ask_for_reneighbouring(step)) p_.pacing.count_build();
+}
+
+// ------------------------------------------------------------------------------------------------------------ between runs
+
+/// Atoms come and go now: neighbour lists, which name them by their indices, and ghosts are void until the next run sets up.
+void Culling::leave_lists() {
+  p_.ports.contacts.bring_histories_up_to_date();
+  p_.ports.contacts.forget_neighbours();
+  p_.ports.atoms.drop_ghosts();
+}
+
+void Culling::show_bed() {
+  if (!p_.solid.has_store() || !p_.census.something_locked() || p_.shown.shown()) return;
+  leave_lists();
+  p_.ports.ranks.update();
+  p_.lost.remember();
+  p_.shown.show();
+  p_.ports.atoms.publish_counts(p_.census.stored());
+}
+
+void Culling::hide_bed() {
+  if (!p_.shown.shown()) return;
+  p_.shown.hide();
+  p_.ports.atoms.publish_counts(-p_.census.stored());
+}
+
+/// What the deck did to culled granules between runs.
+void Culling::take_changes() {
+  if (!p_.shown.changed()) return;
+  if (p_.lost.forget_lost()) settle_bodies();
+  p_.closure.begin_run();
+  change();
+  p_.shown.give_changes();
+  take_arrivals();
 }
 
 // ------------------------------------------------------------------------------------------------------------ a look
@@ -422,18 +462,24 @@ void Culling::fit_memory() {
   memory.freed(before);
 }
 
-void Culling::restore_all() {
+std::int64_t Culling::restore_all() {
   if (p_.snapshot.waits())
     throw InputError("the granules that the restart file holds besides the atoms would be lost: put a run, or 'run 0', before " +
                      ("'unfix " + p_.ports.run.name + "'"));
-  if (!p_.solid.has_store()) return;
-  p_.ports.contacts.bring_histories_up_to_date();
-  p_.ports.ranks.update();
-  p_.wake.ask_all();
-  change();
+  if (!p_.solid.has_store()) return 0;
+  const std::int64_t culled = p_.census.locked();
+  if (culled > 0) {
+    p_.shown.shown() ? hide_bed() : leave_lists();
+    p_.ports.ranks.update();
+    if (p_.lost.forget_lost()) settle_bodies();
+    p_.wake.ask_all();
+    change();
+    p_.shown.give_changes();
+  }
   p_.ports.memory.give_bins_back();
   if (p_.solid.store().size() != 0 || p_.solid.locked() != 0 || p_.solid.contacts().size() != 0)
     throw InternalError("a restore of everything left " + std::to_string(p_.solid.store().size()) + " granules in the store");
+  return culled;
 }
 
 // ------------------------------------------------------------------------------------------------------------ insertion
@@ -442,7 +488,7 @@ void Culling::restore_all() {
 void Culling::open_for_insertion() {
   if (phase_ == Phase::beginning) {
     open_for_insertion_ = open_for_insertion_ || p_.ports.insertions.any();
-  } else if (p_.ports.insertions.any_due(p_.ports.run.step + 2)) {
+  } else if (p_.ports.insertions.any_due(p_.ports.run.deck_step() + 2)) {
     open_for_insertion_ = true;
     p_.ports.run.ask_for_reneighbouring(p_.ports.run.step + 1);
   }

@@ -36,8 +36,16 @@ class Culling {
   void write_outputs();
 
   void end_run();
-  /// All granules become exterior.
-  void restore_all();
+
+  // --- between runs
+  /// All granules are atoms, as in the unculled deck, until hide_bed(); nothing if they are already, or none is culled.
+  void show_bed();
+  /// What was culled and not changed is culled again; what was changed wakes when the run begins.
+  void hide_bed();
+  bool bed_is_shown() const { return p_.shown.shown(); }  ///< local
+  bool waits_for_run() const { return p_.snapshot.waits(); }  ///< for what a restart file holds. Local
+  /// All granules become exterior. Returns how many were not, over all ranks.
+  std::int64_t restore_all();
 
   // --- state
   double value(int n) { return p_.report.value(n); }                                        ///< f_ID[n + 1]
@@ -64,7 +72,10 @@ class Culling {
   void expect(std::initializer_list<Phase> phases, const char* where) const;
 
   void find_scales();
+  void leave_lists();
+  void take_changes();
   void take_arrivals();
+  void settle_bodies();
   void refuse_what_lies_too_far() const;
   void see_walls(bool new_run);
   void take_loads();

@@ -28,10 +28,11 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       lost(ports, solid, shell, index, masses),
       snapshot(ports, scales, solid, shell, index, parcels, gravity),
       meshes(scales, solid, masses),
+      shown(ports, scales, solid, shell, index, groups, wake),
       report(ports, solid, shell, groups, motion),
       files(ports, scales, solid, shell, index, groups, meshes, report),
       invariants(ports, scales, solid, shell, groups, stored, census),
-      followers{&shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows()} {
+      followers{&shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown} {
   solid.set_types(types);
   for (BodyFollower* f : std::initializer_list<BodyFollower*>{&motion, &grounding, &closure, &handover, &cover})
     solid.followed_by(*f);

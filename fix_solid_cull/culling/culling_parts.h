@@ -25,6 +25,7 @@
 #include "scales.h"
 #include "shell.h"
 #include "shell_closure.h"
+#include "shown_bed.h"
 #include "snapshot.h"
 #include "solid.h"
 #include "store_exchange.h"
@@ -78,6 +79,7 @@ struct CullingParts {
   LostAtoms lost;
   Snapshot snapshot;
   BodyMeshes meshes;
+  ShownBed shown;
 
   Report report;
   OutputFiles files;

@@ -13,11 +13,11 @@ namespace solidcull {
 std::string OutputFiles::file_of_step(const std::string& pattern) const {
   const std::size_t star = pattern.find('*');
   if (star == std::string::npos) return pattern;
-  return pattern.substr(0, star) + std::to_string(ports_.run.step) + pattern.substr(star + 1);
+  return pattern.substr(0, star) + std::to_string(ports_.run.deck_step()) + pattern.substr(star + 1);
 }
 
 void OutputFiles::write_due() {
-  const auto due = [&](int every) { return every > 0 && ports_.run.step % every == 0; };
+  const auto due = [&](int every) { return every > 0 && ports_.run.deck_step() % every == 0; };
   for (const Output& o : scales_.settings().meshes)
     if (due(o.every)) write_meshes(file_of_step(o.file));
   for (const Output& o : scales_.settings().beds)

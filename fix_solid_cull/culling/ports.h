@@ -79,6 +79,11 @@ class Atoms {
   virtual int put_back(const std::vector<double>& record, int layout) = 0;
   /// Into the periodic box; which image it is follows from the place.
   virtual void wrap(int i) = 0;
+  /// Owned granule i has this size (m, kg) from here on.
+  virtual void set_size(int i, double radius, double mass) = 0;
+  virtual void drop_ghosts() = 0;
+  /// Granules may be anywhere in the box: each goes to the rank that has its place. Collective.
+  virtual void send_far() = 0;
 
   /// Column layouts for restart files and other ranks.
   virtual int layouts() const = 0;
@@ -139,6 +144,7 @@ class Contacts {
   virtual std::vector<bool> flips() const = 0;    ///< for each history number: does it change sign with the side
   virtual std::vector<int> vectors() const = 0;   ///< first indices of those that are vectors of space
   virtual void bring_histories_up_to_date() = 0;  ///< outside of a time step
+  virtual void forget_neighbours() = 0;           ///< the lists are empty until they are built again
 
   struct History {
     std::int64_t partner;
@@ -272,14 +278,16 @@ class Run {
  public:
   virtual ~Run() = default;
 
-  std::int64_t step = 0;
-  double dt = 0;    ///< s
+  std::int64_t step = 0;      ///< goes on where the deck resets its time step
+  std::int64_t reset_by = 0;  ///< the deck's number of this step, less `step`
+  double dt = 0;              ///< s
   double skin = 0;  ///< Verlet skin (m)
   Box box, own;     ///< the whole box, this rank's subdomain
   Box kept;         ///< what passes its sides is lost; infinite where the box is periodic or follows the granules
   std::array<bool, 3> periodic{};
   std::string name;  ///< the fix's ID
 
+  std::int64_t deck_step() const { return step + reset_by; }
   Vec3 edges() const { return box.hi - box.lo; }
   bool any_periodic() const { return periodic[0] || periodic[1] || periodic[2]; }
 

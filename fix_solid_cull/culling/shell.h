@@ -112,6 +112,8 @@ class Shell : public FollowsAtoms {
     e.spin = atoms.spin(i);
   }
 
+  /// As it was, on this rank.
+  void put(int i, const Locked& e) { rows_[i] = e; }
   /// Body and place, as locking gives them, or as they are after a split or a merge.
   void stands(int i, const SolidBodies::Place& at) {
     rows_[i].body = at.body;

@@ -11,7 +11,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261123;  // the format's version
+constexpr double file_mark = 20261124;  // the format's version
 /// The numbers before the ranks' parcels. A check sum follows them.
 enum Header {
   mark,
@@ -23,6 +23,7 @@ enum Header {
   counters = gravity_x + 3,
   width = counters + 4,
   ranks,
+  step,
   header_size
 };
 constexpr std::size_t check_sum_size = 2;
@@ -80,6 +81,7 @@ std::vector<double> Snapshot::write() {
   std::copy_n(sums.begin(), 4, h + counters);
   h[width] = static_cast<double>(solid_.contacts().width());
   h[ranks] = ports_.ranks.count;
+  h[step] = static_cast<double>(ports_.run.step);
   state.reserve(static_cast<std::size_t>(size));
   state.insert(state.end(), all.begin(), all.end());
   const auto sum = check_sum(state.data(), state.size());
@@ -110,6 +112,7 @@ void Snapshot::read(const std::vector<double>& state) {
   const double* const h = state_.data();
   scales_.set(h[diameter], h[gravity]);
   gravity_.set_at_last_look(vec(h + gravity_x));
+  ports_.run.reset_by += ports_.run.step - static_cast<std::int64_t>(h[step]);
   const bool first = ports_.ranks.me == 0;
   solid_.set_counters({first ? h[counters] : 0, first ? h[counters + 1] : 0, h[counters + 2], first ? h[counters + 3] : 0});
 

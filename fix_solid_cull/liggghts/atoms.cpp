@@ -8,6 +8,7 @@
 #include "domain.h"
 #include "engine_access.h"
 #include "group.h"
+#include "irregular.h"
 #include "output.h"
 #include "update.h"
 
@@ -69,6 +70,23 @@ int EngineAtoms::put_back(const std::vector<double>& record, int layout) {
 }
 
 void EngineAtoms::wrap(int i) { domain->remap(atom->x[i], atom->image[i]); }
+
+void EngineAtoms::set_size(int i, double radius, double mass) {
+  atom->radius[i] = radius;
+  atom->rmass[i] = mass;
+}
+
+void EngineAtoms::drop_ghosts() {
+  clear_map();  // by the tags of ghosts too
+  atom->nghost = 0;
+  renew();
+}
+
+void EngineAtoms::send_far() {
+  for (int i = 0; i < atom->nlocal; ++i) wrap(i);
+  LAMMPS_NS::Irregular(lmp).migrate_atoms();
+  renew();
+}
 
 void EngineAtoms::publish_counts(std::int64_t returned) {
   LAMMPS_NS::bigint here = atom->nlocal;

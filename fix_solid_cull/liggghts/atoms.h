@@ -27,6 +27,9 @@ class EngineAtoms : public Atoms, protected LAMMPS_NS::Pointers {
   void take_out(int i) override;
   int put_back(const std::vector<double>& record, int layout) override;
   void wrap(int i) override;
+  void set_size(int i, double radius, double mass) override;
+  void drop_ghosts() override;
+  void send_far() override;
   int layouts() const override { return records_.layouts(); }
   std::string layout_text(int layout) const override { return records_.layout_text(layout); }
   int layout_from_text(const std::string& text) override { return records_.layout_from_text(text); }

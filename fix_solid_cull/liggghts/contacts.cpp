@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "atom.h"
+#include "deck_commands.h"
 #include "force.h"
 #include "neigh_list.h"
 #include "neighbor.h"
@@ -15,6 +16,12 @@ void EngineContacts::renew() { reach_factor = neighbor->contactDistanceFactor; }
 NeighbourRows EngineContacts::neighbours() const {
   const LAMMPS_NS::NeighList* list = force->pair->list;
   return {list->inum, list->ilist, list->numneigh, list->firstneigh, NEIGHMASK};
+}
+
+void EngineContacts::forget_neighbours() {
+  for (int l = 0; l < neighbor->nlist; ++l)
+    if (neighbor->lists[l]) neighbor->lists[l]->inum = 0;
+  lists_are_void = true;
 }
 
 /// `neigh_modify exclude` would do it, at a test for every candidate pair: neighbour builds take 1.7 times as long with it.

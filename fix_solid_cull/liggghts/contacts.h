@@ -24,6 +24,7 @@ class EngineContacts : public Contacts, protected LAMMPS_NS::Pointers {
   std::vector<bool> flips() const override { return histories_.flips(); }
   std::vector<int> vectors() const override { return histories_.vectors(); }
   void bring_histories_up_to_date() override { histories_.bring_up_to_date(); }
+  void forget_neighbours() override;
   void give_histories(int i, const History* contacts, std::size_t n) override { histories_.give(i, contacts, n); }
   void clear_histories(int i) override { histories_.clear(i); }
   Vec3 force_on_first(int i, int k) override { return pair_force_.on_first(i, k); }

@@ -1,5 +1,6 @@
 #include "deck_rules.h"
 
+#include <array>
 #include <cstring>
 
 #include "atom.h"
@@ -64,7 +65,9 @@ void DeckRules::refuse_physics_that_would_miss_granules() const {
 }
 
 /// Only what an integrator moves and gravity pulls can be part of a solid body; what another fix holds or drives stays exterior.
-void DeckRules::find_movable(EngineAtoms& atoms, const Run& run) const {
+bool DeckRules::find_movable(EngineAtoms& atoms, const Run& run) {
+  const auto bits = [&] { return std::array<int, 4>{atoms.movable_bits, atoms.held_bits, atoms.gravity_bits, atoms.own_bit}; };
+  const auto before = bits();
   atoms.movable_bits = atoms.held_bits = atoms.gravity_bits = 0;
   for (int f = 0; f < modify->nfix; ++f) {
     const LAMMPS_NS::Fix* fix = modify->fix[f];
@@ -76,7 +79,8 @@ void DeckRules::find_movable(EngineAtoms& atoms, const Run& run) const {
         atoms.movable_bits |= fix->groupbit;
         break;
       case Treatment::drives:
-        run.say("fix " + std::string(fix->id) + " (" + fix->style + ") " + style.why + ": granules of its group are not culled");
+        if (told_.insert(fix->id).second)
+          run.say("fix " + std::string(fix->id) + " (" + fix->style + ") " + style.why + ": granules of its group are not culled");
         atoms.held_bits |= fix->groupbit;
         break;
       case Treatment::holds:
@@ -86,6 +90,7 @@ void DeckRules::find_movable(EngineAtoms& atoms, const Run& run) const {
         break;
     }
   }
+  return bits() != before;
 }
 
 std::string state_that_no_fix_has(LAMMPS_NS::Modify& modify) {

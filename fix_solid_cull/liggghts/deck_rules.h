@@ -1,6 +1,7 @@
 // Which decks the culling can run with: what is refused, and which groups stay exterior.
 #pragma once
 
+#include <set>
 #include <string>
 
 #include "atoms.h"
@@ -16,13 +17,15 @@ class DeckRules : protected LAMMPS_NS::Pointers {
   /// When the fix is made; when a run begins. InputError says what to do. Local, alike on all ranks.
   void refuse_what_was_set_up_wrongly() const;
   void refuse_what_cannot_be_culled() const;
-  /// Which groups of the deck may be culled: bits of `atoms`. Says where a group stays exterior for its fix.
-  void find_movable(EngineAtoms& atoms, const Run& run) const;
+  /// Which groups of the deck may be culled: bits of `atoms`; true if they are others than before. Says where a group stays
+  /// exterior for its fix.
+  bool find_movable(EngineAtoms& atoms, const Run& run);
 
  private:
   void refuse_physics_that_would_miss_granules() const;
 
   const LAMMPS_NS::Fix* own_;
+  std::set<std::string> told_;  // fixes whose groups stay exterior
 };
 
 /// One line on granules in a restart file that no fix of the deck has taken up; empty where there are none. Local, alike on all

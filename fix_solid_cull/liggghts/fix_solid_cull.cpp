@@ -124,7 +124,6 @@ void FixSolidCull::init() {
     rules_.refuse_what_cannot_be_culled();
     contacts_.connect();
     walls_.connect();
-    rules_.find_movable(atoms_, run_);
     culling_->begin_run();
   });
 }
@@ -179,11 +178,46 @@ void FixSolidCull::end_of_step() {
 }
 
 void FixSolidCull::post_run() {
+  in_run_ = false;
   hand_on([&] { culling_->end_run(); });
 }
 
 void FixSolidCull::pre_delete(bool unfix) {
   if (unfix) hand_on([&] { culling_->restore_all(); });
+}
+
+// ------------------------------------------------------------------------------------------------------------ between runs
+
+void FixSolidCull::run_begins() {
+  hand_on([&] {
+    if (rules_.find_movable(atoms_, run_)) culling_->show_bed();  // to see who may still be culled
+    culling_->hide_bed();
+  });
+  in_run_ = true;
+}
+
+bool FixSolidCull::show_bed() {
+  return hand_on([&] {
+    const bool before = culling_->bed_is_shown();
+    culling_->show_bed();
+    return !before && culling_->bed_is_shown();
+  });
+}
+
+void FixSolidCull::hide_bed() {
+  hand_on([&] { culling_->hide_bed(); });
+}
+
+void FixSolidCull::restore_all(const char* command) {
+  hand_on([&] {
+    if (culling_->restore_all() > 0)
+      run_.say("'" + std::string(command) + "' may change which granules there are: all are exterior now");
+  });
+  vector_atom = culling_->labels();
+}
+
+void FixSolidCull::refuse_before_first_run(const std::string& where) {
+  refuse("the granules that the restart file holds besides the atoms come with the first run: put 'run 0' " + where);
 }
 
 // ------------------------------------------------------------------------------------------------------------ state

@@ -64,6 +64,19 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
 
   const std::map<int, InterfaceMesh>& interface_meshes() override;
 
+  // --- between runs; collective
+  bool in_run() const { return in_run_; }
+  void run_begins();
+  /// True if the bed was not shown before, and is now.
+  bool show_bed();
+  void hide_bed();
+  void restore_all(const char* command);
+  /// The deck counts its steps anew, so much higher.
+  void time_was_reset(std::int64_t by) { run_.reset_by += by; }
+  /// A restart file was read, and what it holds besides atoms comes with the first run. Local.
+  bool waits_for_run() { return culling_->waits_for_run(); }
+  void refuse_before_first_run(const std::string& where);
+
  private:
   /// What goes wrong ends in one line, not in a stack trace.
   template <class Work>
@@ -86,6 +99,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   EngineMemory memory_;
   DeckRules rules_;
   std::unique_ptr<Culling> culling_;
+  bool in_run_ = false;
 };
 
 }  // namespace solidcull

@@ -4,18 +4,22 @@
 #include <cstring>
 #include <string>
 
+#include "deck_commands.h"
 #include "deck_rules.h"
 #include "domain.h"
 #include "engine_access.h"
 #include "error.h"
 #include "fix_mesh_surface.h"
 #include "fix_solid_cull.h"
+#include "input.h"
 #include "lammps.h"
 #include "memory.h"
 #include "mesh_loads.h"
 #include "modify.h"
 #include "region_interface_mesh.h"
 #include "solidcull.h"
+#include "update.h"
+#include "variable.h"
 
 namespace {
 
@@ -47,12 +51,39 @@ void Modify::add_fix(int narg, char** arg, char* suffix) {
 }
 
 /// The engine forgets here what a restart file holds for fixes that the deck has not made: culled granules would be lost.
+/// Before anything of a run is set up.
 void Modify::init() {
   using Original = void (*)(Modify*);
   static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Modify4initEv");
   const std::string lost = solidcull::state_that_no_fix_has(*this);
   if (!lost.empty()) error->all(FLERR, lost.c_str());
+  constexpr int between_runs = 0;
+  if (update->whichflag != between_runs) solidcull::run_begins(lmp);
   original(this);
+}
+
+/// delete_atoms asks whether there are contact histories, to take them from the neighbour lists.
+int Modify::n_fixes_style_strict(const char* style) {
+  using Original = int (*)(Modify*, const char*);
+  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Modify20n_fixes_style_strictEPKc");
+  if (std::strcmp(style, "contacthistory") == 0 && solidcull::leaves_histories()) return 0;
+  return original(this, style);
+}
+
+/// Each command of a deck, however it comes.
+int Input::execute_command() {
+  using Original = int (*)(Input*);
+  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS5Input15execute_commandEv");
+  const solidcull::MetCommand met(lmp, command, command_map->count(command) > 0, arg, narg);
+  return original(this);
+}
+
+/// Formulas are evaluated between runs too, where a command names a variable.
+double Variable::evaluate(char* str, Tree** tree) {
+  using Original = double (*)(Variable*, char*, Tree**);
+  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS8Variable8evaluateEPcPPNS0_4TreeE");
+  solidcull::met_formula(lmp, str);
+  return original(this, str, tree);
 }
 
 void Domain::add_region(int narg, char** arg) {

@@ -14,7 +14,7 @@
 namespace solidcull {
 
 void EngineRun::renew() {
-  step = update->ntimestep;
+  step = update->ntimestep - reset_by;
   dt = update->dt;
   skin = neighbor->skin;
   box = {vec(domain->boxlo), vec(domain->boxhi)};
@@ -47,8 +47,8 @@ Vec3 EngineRun::wrapped(const Vec3& place) const {
 }
 
 bool EngineRun::ask_for_reneighbouring(std::int64_t at) {
-  const bool is_new = own_->next_reneighbor != at;
-  own_->next_reneighbor = at;
+  const bool is_new = own_->next_reneighbor != at + reset_by;
+  own_->next_reneighbor = at + reset_by;
   return is_new;
 }
 

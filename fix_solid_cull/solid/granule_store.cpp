@@ -212,6 +212,23 @@ StoredGranule GranuleStore::get(std::int64_t tag) const { return granule(slot_or
 
 void GranuleStore::record(std::int64_t tag, std::vector<double>& out) const { read_record(slot_or_throw(tag), out); }
 
+void GranuleStore::set_record(std::int64_t tag, int layout, std::vector<double> record, const std::vector<int>& transient) {
+  const int s = slot_or_throw(tag);
+  const auto* known = transient_.of_tag.find(tag_at(s));
+  for (const int i : known ? transient_.indices[known->indices] : transient) record.at(static_cast<std::size_t>(i)) = 0;
+  std::vector<std::uint64_t> row = row_of(s), more;
+  more.assign(row.end() - static_cast<std::ptrdiff_t>(tail_of(row)), row.end());
+  StoredGranule g = granule(s);
+  g.layout = layout;
+  const auto head = head_of_row(g, more.size());
+  row.resize(record_begin + record.size());
+  std::copy(head.begin(), head.end(), row.begin());
+  if (!record.empty()) std::memcpy(row.data() + record_begin, record.data(), record.size() * sizeof(double));
+  row.insert(row.end(), more.begin(), more.end());
+  rows_.drop(row_at(s));
+  set_row(s, rows_.put(row.data(), static_cast<int>(row.size())));
+}
+
 void GranuleStore::tail(std::int64_t tag, std::vector<std::uint64_t>& out) const {
   const std::vector<std::uint64_t> row = row_of(slot_or_throw(tag));
   out.assign(row.end() - static_cast<std::ptrdiff_t>(tail_of(row)), row.end());

@@ -73,6 +73,9 @@ class GranuleStore {
   }
   StoredGranule get(std::int64_t tag) const;                      ///< std::logic_error if it is not there
   void record(std::int64_t tag, std::vector<double>& out) const;  ///< likewise
+  /// Another record for a granule that stays as it is; the words at the indices `transient` become 0.0, unless they are known
+  /// still. Likewise.
+  void set_record(std::int64_t tag, int layout, std::vector<double> record, const std::vector<int>& transient);
   /// Some words more, none at first; they go with it and are lost when it is taken out. Likewise.
   void tail(std::int64_t tag, std::vector<std::uint64_t>& out) const;
   void set_tail(std::int64_t tag, const std::vector<std::uint64_t>& tail);

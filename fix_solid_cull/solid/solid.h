@@ -135,6 +135,10 @@ class Solid {
                 const std::vector<WallLoad>& loads);
   /// It leaves the store and is an interface granule of its body again; `record` receives its engine record.
   StoredGranule bring_back(std::int64_t tag, std::vector<double>& record);
+  /// Another engine record for a stored granule that is the same to the culling; see GranuleStore::set_record.
+  void set_record(std::int64_t tag, int layout, const std::vector<double>& record, const std::vector<int>& transient) {
+    store_->set_record(tag, layout, record, transient);
+  }
   void forget_transient() { store_->forget_transient(); }
 
   // --- from a restart file or another rank; enter_store() once all contacts are there

@@ -368,6 +368,11 @@ int SmallAtoms::put_back(const std::vector<double>& record, int layout) {
 
 void SmallAtoms::wrap(int i) { set_place(i, world_.run.wrapped(place(i))); }
 
+void SmallAtoms::set_size(int i, double radius, double mass) {
+  radius_[static_cast<std::size_t>(i)] = radius;
+  mass_[static_cast<std::size_t>(i)] = mass;
+}
+
 int SmallAtoms::layout_from_text(const std::string& text) {
   const auto known = std::find(texts_.begin(), texts_.end(), text);
   if (known != texts_.end()) return static_cast<int>(known - texts_.begin());

@@ -108,6 +108,8 @@ class SmallAtoms : public Atoms {
   void take_out(int i) override;
   int put_back(const std::vector<double>& record, int layout) override;
   void wrap(int i) override;
+  void set_size(int i, double radius, double mass) override;
+  void send_far() override { ++sent_far; }
   int layouts() const override { return static_cast<int>(texts_.size()); }
   std::string layout_text(int layout) const override { return texts_.at(static_cast<std::size_t>(layout)); }
   int layout_from_text(const std::string& text) override;
@@ -116,7 +118,7 @@ class SmallAtoms : public Atoms {
 
   int find(int tag) const;  ///< owned; -1: none
   int append();             ///< a new owned atom, all zero
-  void drop_ghosts() { ghosts = 0; }
+  void drop_ghosts() override { ghosts = 0; }
   int append_ghost();
   void swap(int i, int j);  ///< owned ones; followers follow
   void fit(int new_room);
@@ -125,6 +127,7 @@ class SmallAtoms : public Atoms {
   std::vector<double> colour;  ///< a column that the culling knows nothing of
   std::int64_t published = -1, returned_last = 0;
   bool sort_asked = false;
+  int sent_far = 0;
   std::vector<FollowsAtoms*> followers;
 
  private:
@@ -149,6 +152,7 @@ class SmallContacts : public Contacts {
   std::vector<bool> flips() const override { return std::vector<bool>(static_cast<std::size_t>(width), true); }
   std::vector<int> vectors() const override { return width ? std::vector<int>{0} : std::vector<int>{}; }
   void bring_histories_up_to_date() override { ++brought_up_to_date; }
+  void forget_neighbours() override { rows_are_invalid(); }
   void give_histories(int i, const History* contacts, std::size_t n) override;
   void clear_histories(int i) override;
   Vec3 force_on_first(int i, int k) override;

@@ -1,0 +1,270 @@
+#include "shown_bed.h"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+
+namespace solidcull {
+namespace {
+
+// more comparisons than this of granules that wake with granules that may: all wake at once
+constexpr double most_comparisons = 2e8;
+// likewise where more than this share of all that is locked was changed
+constexpr double most_changed = 0.25;
+
+/// Of the numbers' bits (FNV-1a by words).
+std::uint64_t sum_of(const std::vector<double>& numbers) {
+  std::uint64_t sum = 14695981039346656037u;
+  for (const double& x : numbers) {
+    std::uint64_t word;
+    std::memcpy(&word, &x, sizeof word);
+    sum = (sum ^ word) * 1099511628211u;
+    sum ^= sum >> 29;
+  }
+  return sum;
+}
+
+bool same_bits(const Vec3& a, const Vec3& b) { return std::memcmp(a.data(), b.data(), sizeof(Vec3)) == 0; }
+
+}  // namespace
+
+// ------------------------------------------------------------------------------------------------------------ out
+
+void ShownBed::show() {
+  names_.assign(static_cast<std::size_t>(ports_.atoms.room), Name());
+  granules_.clear();
+  interface_.clear();
+  shown_ = true;
+  show_interface();
+  show_stored();
+}
+
+void ShownBed::show_interface() {
+  Atoms& atoms = ports_.atoms;
+  for (int i = 0; i < atoms.owned; ++i) {
+    if (!shell_.locked(i)) continue;
+    const Locked& e = shell_[i];
+    interface_.push_back({e, atoms.velocity(i), atoms.spin(i)});
+    if (e.lock_step == ports_.run.step) {  // no step has passed since: the deck sees the motion that it had
+      atoms.set_velocity(i, e.velocity);
+      atoms.set_spin(i, e.spin);
+    }
+    note(i, false);
+  }
+}
+
+void ShownBed::show_stored() {
+  Atoms& atoms = ports_.atoms;
+  std::vector<std::int64_t> tags;
+  solid_.store().for_each([&](const Resident& g) { tags.push_back(g.tag); });
+  std::vector<double> record;
+  for (const std::int64_t tag : tags) {
+    const StoredGranule g = solid_.store().get(tag);
+    solid_.store().record(tag, record);
+    const int i = atoms.put_back(record, g.layout);
+    if (!solid_.store().transient_known(tag)) {
+      const SolidBody& body = solid_.bodies().body(g.body);
+      const Vec3 x = body.pose.to_world(g.position);
+      const Vec3 near = scales_.compact() ? Vec3(0.5 * (ports_.run.box.lo + ports_.run.box.hi)) : atoms.place(i);
+      atoms.set_place(i, solid_.nearest_image(x, near));
+      atoms.set_velocity(i, body.twist.at(x));
+      atoms.set_spin(i, body.twist.spin);
+    }
+    atoms.mark_interface(i, false);
+    shell_.label(i, groups_.key_of(g.body));
+    note(i, true);
+  }
+  if (!tags.empty())
+    motion_words_ = atoms.motion_words(atoms.owned - 1, !ports_.run.any_periodic() || scales_.compact());
+}
+
+void ShownBed::note(int i, bool stored) {
+  Atoms& atoms = ports_.atoms;
+  std::vector<double> record;
+  int layout = 0;
+  atoms.pack(i, record, layout);
+  names_[static_cast<std::size_t>(i)] = {ports_.ranks.me, static_cast<std::int32_t>(granules_.size())};
+  granules_.push_back({atoms.tag[i], stored, false, atoms.place(i), atoms.velocity(i), atoms.spin(i), atoms.radius[i], atoms.mass[i],
+                       atoms.type[i], sum_of(record)});
+}
+
+// ------------------------------------------------------------------------------------------------------------ back
+
+void ShownBed::hide() {
+  Atoms& atoms = ports_.atoms;
+  changes_.clear();
+  asking_.clear();
+  std::vector<int> at(granules_.size(), gone);
+  bring_strangers_home(at);
+  for (std::size_t k = 0; k < granules_.size(); ++k) judge(k, at[k]);
+
+  std::vector<int> guests;
+  for (std::size_t k = 0; k < granules_.size(); ++k)
+    if (granules_[k].stored && at[k] != gone) guests.push_back(at[k]);
+  std::sort(guests.rbegin(), guests.rend());
+  for (const int i : guests) atoms.take_out(i);
+
+  std::int64_t counts[3] = {static_cast<std::int64_t>(changes_.size()), static_cast<std::int64_t>(asking_.size()),
+                            static_cast<std::int64_t>(solid_.locked())};
+  ports_.ranks.sum(counts, 3);
+  changed_ = counts[0] > 0;
+  const double asking = static_cast<double>(counts[1]), locked = static_cast<double>(counts[2]);
+  if (asking > most_changed * locked || asking * locked > most_comparisons) {
+    if (asking > 0) wake_.ask_all();
+  } else {
+    for (const std::int64_t number : asking_)
+      wake_.ask(granules_[static_cast<std::size_t>(number)].place, scales_.wake_up().radius(1));
+  }
+  shown_ = false;
+  names_ = {};
+  granules_ = {};
+  interface_ = {};
+  asking_ = {};
+}
+
+/// A command may have sent granules to other ranks; they go back to where their bodies are.
+void ShownBed::bring_strangers_home(std::vector<int>& at) {
+  Atoms& atoms = ports_.atoms;
+  std::vector<double> mine, record;
+  for (int i = atoms.owned - 1; i >= 0; --i) {
+    const Name& name = names_[static_cast<std::size_t>(i)];
+    if (name.home == nobody || name.home == ports_.ranks.me) continue;
+    int layout = 0;
+    atoms.pack(i, record, layout);
+    const std::string text = atoms.layout_text(layout);
+    mine.insert(mine.end(), {double(name.home), double(name.number), double(text.size()), double(record.size())});
+    mine.insert(mine.end(), text.begin(), text.end());
+    mine.insert(mine.end(), record.begin(), record.end());
+    shell_.reset(i);
+    atoms.take_out(i);
+  }
+  if (ports_.ranks.any(!mine.empty())) {
+    const std::vector<double> all = ports_.ranks.gather(mine);
+    for (const double* row = all.data(); row != all.data() + all.size();) {
+      const int home = static_cast<int>(row[0]), number = static_cast<int>(row[1]);
+      const double *const text = row + 4, *const numbers = text + static_cast<std::size_t>(row[2]);
+      row = numbers + static_cast<std::size_t>(row[3]);
+      if (home != ports_.ranks.me) continue;
+      record.assign(numbers, row);
+      const int i = atoms.put_back(record, atoms.layout_from_text(std::string(text, numbers)));
+      names_[static_cast<std::size_t>(i)] = {home, number};
+      Shown& s = granules_[static_cast<std::size_t>(number)];
+      s.has_been_away = true;
+      if (!s.stored) shell_.put(i, interface_[static_cast<std::size_t>(number)].state);
+    }
+  }
+  for (int i = 0; i < atoms.owned; ++i)
+    if (const Name& name = names_[static_cast<std::size_t>(i)]; name.home == ports_.ranks.me)
+      at[static_cast<std::size_t>(name.number)] = i;
+}
+
+bool ShownBed::is_as_shown(const Shown& s, int i) const {
+  const Atoms& atoms = ports_.atoms;
+  return same_bits(atoms.place(i), s.place) && same_bits(atoms.velocity(i), s.velocity) && same_bits(atoms.spin(i), s.spin) &&
+         atoms.radius[i] == s.radius && atoms.mass[i] == s.mass && atoms.type[i] == s.type;
+}
+
+/// What became of a granule, which is atom i.
+void ShownBed::judge(std::size_t number, int i) {
+  const Shown& s = granules_[number];
+  Atoms& atoms = ports_.atoms;
+  const auto wakes = [&] { asking_.push_back(static_cast<std::int64_t>(number)); };
+  if (i == gone) {
+    wakes();
+    changes_[s.tag].deleted = true;
+    return;
+  }
+  if (atoms.tag[i] != s.tag)
+    throw InternalError("granule " + std::to_string(s.tag) + " was renumbered as " + std::to_string(atoms.tag[i]));
+  std::vector<double> record;
+  int layout = 0;
+  atoms.pack(i, record, layout);
+  const bool same = sum_of(record) == s.sum;
+  // what walls and cover knew of an interface granule does not come back with it from another rank
+  const bool changed = (!same && !is_as_shown(s, i)) || (s.has_been_away && !s.stored);
+  if (changed || !atoms.may_be_culled(i)) wakes();  // or the deck holds or drives it from now on
+  if (changed) changes_[s.tag] = {false, layout, record};
+  if (s.stored) {
+    if (same || changed) return;
+    atoms.mark_interface(i, true);  // as it went into the store
+    atoms.pack(i, record, layout);
+    solid_.set_record(s.tag, layout, record, motion_words_);
+    return;
+  }
+  // until it wakes, or goes on in its body, it is as it was
+  atoms.set_place(i, s.place);
+  atoms.set_velocity(i, interface_[number].velocity);
+  atoms.set_spin(i, interface_[number].spin);
+  atoms.set_size(i, s.radius, s.mass);
+}
+
+void ShownBed::give_changes() {
+  if (!changed_) return;
+  changed_ = false;
+  index_.index(ports_.atoms);
+  for (const auto& [tag, change] : changes_)
+    if (const int* i = index_.find(tag)) {  // an interface granule that was deleted is no atom any more
+      give(*i, change);
+    } else if (!change.deleted) {
+      throw InternalError("granule " + std::to_string(tag) + " was changed and did not wake");
+    }
+  changes_.clear();
+  const Atoms& atoms = ports_.atoms;
+  bool far = false;
+  for (int i = 0; i < atoms.owned && !far && ports_.ranks.count > 1; ++i) far = !ports_.ranks.owns(atoms.place(i));
+  ports_.atoms.publish_counts(0);
+  if (ports_.ranks.any(far)) ports_.atoms.send_far();
+}
+
+/// It keeps its contacts.
+void ShownBed::give(int i, const Change& change) {
+  Atoms& atoms = ports_.atoms;
+  const std::int64_t tag = atoms.tag[i];
+  std::vector<std::int64_t> partners;
+  std::vector<double> numbers;
+  const HistoryRows rows = ports_.contacts.histories();
+  rows.for_each_partner(i, [&](std::int64_t partner, const double* history) {
+    partners.push_back(partner);
+    numbers.insert(numbers.end(), history, history + rows.width);
+  });
+  ports_.contacts.clear_histories(i);
+  shell_.reset(i);
+  atoms.take_out(i);
+  index_.erase(tag);
+  if (i < atoms.owned) index_.set(atoms.tag[i], i);
+  if (change.deleted) return;
+  const int now = atoms.put_back(change.record, change.layout);
+  atoms.mark_interface(now, false);
+  ports_.contacts.clear_histories(now);
+  std::vector<Contacts::History> contacts;
+  for (std::size_t k = 0; k < partners.size(); ++k)
+    contacts.push_back({partners[k], numbers.data() + k * static_cast<std::size_t>(rows.width)});
+  ports_.contacts.give_histories(now, contacts.data(), contacts.size());
+  index_.set(tag, now);
+}
+
+// ------------------------------------------------------------------------------------------------------------ by atom
+
+void ShownBed::grow(int room) {
+  if (shown_) names_.resize(static_cast<std::size_t>(room));
+}
+
+void ShownBed::copy(int from, int to) {
+  if (shown_) names_[static_cast<std::size_t>(to)] = names_[static_cast<std::size_t>(from)];
+}
+
+void ShownBed::reset(int i) {
+  if (shown_) names_[static_cast<std::size_t>(i)] = Name();
+}
+
+void ShownBed::pack(int i, double* to) const {
+  if (!shown_) return;
+  to[0] = names_[static_cast<std::size_t>(i)].home;
+  to[1] = names_[static_cast<std::size_t>(i)].number;
+}
+
+void ShownBed::unpack(int i, const double* from) {
+  if (shown_) names_[static_cast<std::size_t>(i)] = {static_cast<int>(from[0]), static_cast<std::int32_t>(from[1])};
+}
+
+}  // namespace solidcull

@@ -1,0 +1,94 @@
+// The whole bed as atoms, for what a deck does between two runs (invariant I9).
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "atom_index.h"
+#include "body_groups.h"
+#include "per_granule.h"
+#include "ports.h"
+#include "shell.h"
+#include "solid.h"
+#include "wake_requests.h"
+
+namespace solidcull {
+
+/// Stored granules come out as guests, while bodies, store and frozen contacts stay as they are. What the deck left alone goes
+/// back at once. What it changed wakes with all that is near, and then has the state that the deck gave it.
+class ShownBed : public FollowsAtoms {
+ public:
+  ShownBed(const Ports& ports, const Scales& scales, Solid& solid, Shell& shell, AtomIndex& index, const BodyGroups& groups,
+           WakeRequests& wake)
+      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), index_(index), groups_(groups), wake_(wake) {}
+
+  bool shown() const { return shown_; }
+  /// Contact histories are up to date, and there are no ghosts. Local.
+  void show();
+  /// Guests go; what was changed asks to wake. Collective.
+  void hide();
+  /// Whether hide() found changes that wait for give_changes(), on any rank.
+  bool changed() const { return changed_; }
+  /// After the membership change in which they woke: granules have what the deck gave them, or are deleted. Collective.
+  void give_changes();
+
+  void grow(int room) override;
+  void copy(int from, int to) override;
+  void reset(int i) override;
+  int packed_size() const override { return shown_ ? 2 : 0; }
+  void pack(int i, double* to) const override;
+  void unpack(int i, const double* from) override;
+  void fit(int room) override { grow(room); }
+
+ private:
+  static constexpr int nobody = -1, gone = -1;
+  /// Which of the granules it is that a rank has shown.
+  struct Name {
+    int home = nobody;
+    std::int32_t number = 0;
+  };
+  struct Shown {
+    std::int64_t tag;
+    bool stored, has_been_away;  // has_been_away: on another rank
+    Vec3 place, velocity, spin;  // as shown
+    double radius, mass;
+    int type;
+    std::uint64_t sum;  // of all its numbers, as shown
+  };
+  struct Interface {
+    Locked state;
+    Vec3 velocity, spin;  // that of its body
+  };
+  struct Change {
+    bool deleted = false;
+    int layout = 0;
+    std::vector<double> record;
+  };
+
+  void show_interface();
+  void show_stored();
+  void note(int i, bool stored);
+  bool is_as_shown(const Shown& s, int i) const;
+  void bring_strangers_home(std::vector<int>& at);
+  void judge(std::size_t number, int i);
+  void give(int i, const Change& change);
+
+  const Ports& ports_;
+  const Scales& scales_;
+  Solid& solid_;
+  Shell& shell_;
+  AtomIndex& index_;
+  const BodyGroups& groups_;
+  WakeRequests& wake_;
+
+  bool shown_ = false, changed_ = false;
+  std::vector<Name> names_;           // by atom
+  std::vector<Shown> granules_;       // by number
+  std::vector<Interface> interface_;  // by number: the first ones are interface granules
+  std::vector<int> motion_words_;     // of a record
+  std::vector<std::int64_t> asking_;  // those that are to wake
+  std::map<std::int64_t, Change> changes_;
+};
+
+}  // namespace solidcull

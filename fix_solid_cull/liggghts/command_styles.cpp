@@ -1,0 +1,164 @@
+#include "command_styles.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+#include <iterator>
+
+#include "fix_styles.h"
+
+namespace solidcull {
+namespace {
+
+constexpr Sight nothing = Sight::nothing, run = Sight::run, state = Sight::state, whole_bed = Sight::whole_bed,
+                all_restored = Sight::all_restored;
+
+constexpr CommandStyle styles[] = {
+    {"angle_*", nothing},
+    {"atom_*", nothing},
+    {"bond_*", nothing},
+    {"boundary", nothing},
+    {"box", nothing},
+    {"clear", nothing},
+    {"communicate", nothing},
+    {"compute", nothing},  // but see below
+    {"compute_modify", nothing},
+    {"create_box", nothing},
+    {"dielectric", nothing},
+    {"dihedral_*", nothing},
+    {"dimension", nothing},
+    {"dump", nothing},
+    {"dump_modify", nothing},
+    {"echo", nothing},
+    {"fix", nothing},  // but see below
+    {"fix_modify", nothing},
+    {"force_dt_reset", nothing},
+    {"hard_particles", nothing},
+    {"if", nothing},
+    {"improper_*", nothing},
+    {"include", nothing},
+    {"info", nothing},
+    {"jump", nothing},
+    {"kspace_*", nothing},
+    {"label", nothing},
+    {"lattice", nothing},
+    {"log", nothing},
+    {"mass", nothing},
+    {"min_*", nothing},
+    {"modify_timing", nothing},
+    {"neigh_modify", nothing},
+    {"neighbor", nothing},
+    {"newton", nothing},
+    {"next", nothing},
+    {"package", nothing},
+    {"pair_*", nothing},
+    {"partition", nothing},
+    {"print", nothing},
+    {"processors", nothing},
+    {"quit", nothing},
+    {"region", nothing},
+    {"reset_timestep", nothing},
+    {"restart", nothing},
+    {"run_style", nothing},
+    {"shell", nothing},
+    {"soft_particles", nothing},
+    {"special_bonds", nothing},
+    {"suffix", nothing},
+    {"thermo*", nothing},
+    {"timestep", nothing},
+    {"uncompute", nothing},
+    {"undump", nothing},
+    {"unfix", nothing},
+    {"units", nothing},
+    {"variable", nothing},
+    {"write_restart_on_signal", nothing},
+
+    {"minimize", run},
+    {"run", run},
+    {"run_time", run},
+
+    {"write_restart", state},
+
+    {"create_atoms", whole_bed},
+    {"delete_atoms", whole_bed},  // but see below
+    {"delete_bonds", whole_bed},
+    {"displace_atoms", whole_bed},
+    {"group", whole_bed},
+    {"rotate", whole_bed},
+    {"set", whole_bed},
+    {"velocity", whole_bed},
+    {"write_data", whole_bed},
+    {"write_dump", whole_bed},
+
+    {"change_box", all_restored},
+    {"read_data", all_restored},
+    {"read_dump", all_restored},
+    {"read_restart", all_restored},
+    {"replicate", all_restored},
+};
+
+bool names(const CommandStyle& entry, const std::string& command) {
+  const std::size_t n = std::strlen(entry.name);
+  return entry.name[n - 1] == '*' ? command.compare(0, n - 1, entry.name, n - 1) == 0 : command == entry.name;
+}
+
+bool is_one_of(const std::string& word, std::initializer_list<const char*> list) {
+  return std::find(list.begin(), list.end(), word) != list.end();
+}
+
+/// delete_atoms gives new tags to all that are left, unless told not to.
+bool renumbers(const std::vector<std::string>& words) {
+  bool yes = true;
+  for (std::size_t w = 0; w + 1 < words.size(); ++w)
+    if (words[w] == "compress") yes = words[w + 1] != "no";
+  return yes;
+}
+
+/// Some remember each granule as it is when they are made.
+bool fix_reads_granules(const std::string& style) {
+  const Treatment t = treatment_of(style).treatment;
+  return t == Treatment::drives || t == Treatment::holds || style == "store/state";
+}
+bool compute_reads_granules(const std::string& style) { return style == "msd" || style == "displace/atom"; }
+
+}  // namespace
+
+Sight sight_of(const std::string& command, const std::vector<std::string>& words, bool engine_has_it) {
+  if (command == "delete_atoms" && renumbers(words)) return all_restored;
+  if (command == "fix" && words.size() > 2 && fix_reads_granules(words[2])) return whole_bed;
+  if (command == "compute" && words.size() > 2 && compute_reads_granules(words[2])) return whole_bed;
+  const auto* const found =
+      std::find_if(std::begin(styles), std::end(styles), [&](const CommandStyle& s) { return names(s, command); });
+  if (found == std::end(styles)) return engine_has_it ? all_restored : nothing;
+  return found->sight;
+}
+
+bool reads_granules(const std::string& formula) {
+  const auto in_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
+  for (std::size_t at = 0; at < formula.size();) {
+    if (std::isdigit(static_cast<unsigned char>(formula[at])) || formula[at] == '.') {  // 1e-3 is no word
+      while (at < formula.size() && (in_word(formula[at]) || formula[at] == '.')) ++at;
+      continue;
+    }
+    if (!in_word(formula[at])) {
+      ++at;
+      continue;
+    }
+    std::size_t end = at;
+    while (end < formula.size() && in_word(formula[end])) ++end;
+    const std::string word = formula.substr(at, end - at);
+    at = end;
+    if (word.compare(0, 2, "v_") == 0) continue;  // evaluated for itself
+    if (is_one_of(word, {"PI",    "sqrt",    "exp",   "ln",        "log",       "abs",      "sin",    "cos",    "tan",  "asin",
+                         "acos",  "atan",    "atan2", "random",    "normal",    "ceil",     "floor",  "round",  "ramp", "stagger",
+                         "stride", "logfreq", "vdisplace", "swiggle", "cwiggle", "step",     "elapsed", "elaplong", "dt", "time",
+                         "cpu",   "tpcpu",   "spcpu", "cpuremain", "part",      "vol",      "lx",     "ly",     "lz",   "xlo",
+                         "xhi",   "ylo",     "yhi",   "zlo",       "zhi",       "xy",       "xz",     "yz",     "xlat", "ylat",
+                         "zlat"}))
+      continue;
+    return true;
+  }
+  return false;
+}
+
+}  // namespace solidcull

@@ -1,0 +1,37 @@
+// What the culling does before and after a command of a deck, and before a variable is evaluated between runs (invariant I9).
+#pragma once
+
+#include <cstdint>
+
+namespace LAMMPS_NS {
+class LAMMPS;
+}
+
+namespace solidcull {
+
+/// Lives while the engine works on a command. Collective.
+class MetCommand {
+ public:
+  /// added: one of the engine's command styles. words, n: the engine's own, which a run loses `pre no` from where it must set up.
+  MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, char** words, int& n);
+  ~MetCommand();
+  MetCommand(const MetCommand&) = delete;
+
+ private:
+  LAMMPS_NS::LAMMPS* lmp_;
+  std::int64_t step_ = 0;
+  bool resets_ = false;
+};
+
+/// Between runs only. Collective.
+void met_formula(LAMMPS_NS::LAMMPS* lmp, const char* formula);
+/// Before the engine sets up a run. Collective.
+void run_begins(LAMMPS_NS::LAMMPS* lmp);
+
+/// What the engine's neighbour lists say is void, and contact histories are with the atoms: set where culled granules came out
+/// between runs, until the next run sets up.
+extern bool lists_are_void;
+/// delete_atoms would take contact histories from the lists; asked once by it, says whether to leave them.
+bool leaves_histories();
+
+}  // namespace solidcull

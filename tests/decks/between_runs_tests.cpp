@@ -1,0 +1,181 @@
+// Invariant I9: between runs the deck sees the whole bed, and what it does to culled granules is done, as in the unculled deck.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "engine.h"
+
+namespace decks {
+namespace {
+
+struct Sequence {
+  std::string name, commands;
+  std::vector<std::string> groups, variables;  // compared after the commands
+  enum class Left { same_tags, other_tags } left = Left::same_tags;
+  enum class Then { culled, exterior } then = Then::culled;  // when the next run is set up
+
+  friend void PrintTo(const Sequence& s, std::ostream* out) { *out << s.name; }
+};
+
+class BetweenRuns : public testing::TestWithParam<Sequence> {};
+
+constexpr double diameter = 0.0026;
+
+Bed bed() {
+  Bed b;
+  b.name = "between";
+  b.contact = "model hertz tangential history";
+  b.mesh_walls = true;
+  return b;
+}
+
+const char* fix_line = "fix cull all solid/cull exterior sleep every 50 calm 2 speed 0.05 tolerance 12 0\n";
+// the last look chooses, the next run's setup culls: nothing has moved since
+const char* looks = "run 100\nrun 0\n";
+
+double interior(Engine& e) { return e.vector("cull", 3); }
+
+void expect_same_groups(Engine& a, Engine& b, const std::vector<std::string>& groups) {
+  const State sa = a.state(), sb = b.state();
+  for (const std::string& g : groups) {
+    const int in_a = a.group_bit(g), in_b = b.group_bit(g);
+    std::size_t members = 0;
+    for (const auto& [tag, granule] : sa) {
+      members += (granule.mask & in_a) != 0;
+      ASSERT_EQ((granule.mask & in_a) != 0, (sb.at(tag).mask & in_b) != 0) << "granule " << tag << " in group " << g;
+    }
+    EXPECT_GT(members, 0u) << g;
+  }
+}
+
+TEST_P(BetweenRuns, ActOnAllGranules) {
+  const Sequence& sequence = GetParam();
+  Engine never, culled;
+  never.run(read_bed(bed()) + looks);
+  culled.run(read_bed(bed()) + fix_line + looks);
+  const double before = interior(culled);
+  ASSERT_GT(before, 300);
+
+  never.run(sequence.commands);
+  culled.run(sequence.commands);
+  for (const std::string& v : sequence.variables) {
+    const double there = never.variable(v), here = culled.variable(v);
+    EXPECT_NEAR(here, there, 1e-12 * std::abs(there)) << v;
+  }
+  culled.run("group everyone union all\n");
+  never.run("group everyone union all\n");
+  const State a = never.state(), b = culled.state();
+  ASSERT_EQ(b.size(), a.size());
+  if (sequence.left == Sequence::Left::same_tags) {
+    expect_same_granules(a, b);
+    EXPECT_EQ(largest_difference(a, b, &Granule::x), 0.0);
+    EXPECT_EQ(largest_difference(a, b, &Granule::v), 0.0);
+    EXPECT_EQ(largest_difference(a, b, &Granule::omega), 0.0);
+    std::vector<std::string> groups = sequence.groups;
+    groups.push_back("everyone");
+    expect_same_groups(never, culled, groups);
+  }
+
+  // what was not touched is culled at once
+  never.run("run 0\n");
+  culled.run("run 0\n");
+  if (sequence.then == Sequence::Then::culled)
+    EXPECT_GT(interior(culled), 100);
+  else
+    EXPECT_EQ(interior(culled), 0);
+  expect_all_there(culled, "cull", a.size());
+  const double after = interior(culled);
+  never.run("run 0\n");
+  culled.run("unfix cull\nrun 0\n");
+  const State fa = never.state(), fb = culled.state();
+  ASSERT_EQ(fb.size(), fa.size());
+  if (sequence.left == Sequence::Left::same_tags) {
+    const double contact_force = 13 * fa.begin()->second.mass * 9.81;
+    EXPECT_EQ(largest_difference(fa, fb, &Granule::x), 0.0);
+    EXPECT_EQ(largest_difference(fa, fb, &Granule::v), 0.0);
+    EXPECT_LE(largest_difference(fa, fb, &Granule::f), 1e-12 * std::max(contact_force, largest(fa, &Granule::f)));
+    EXPECT_LE(largest_difference(fa, fb, &Granule::torque),
+              1e-12 * std::max(contact_force * diameter / 2, largest(fa, &Granule::torque)));
+    EXPECT_EQ(never.histories().size(), culled.histories().size());
+  }
+  // and goes on
+  never.run("run 20\n");
+  culled.run("run 20\n");
+  const State ga = never.state(), gb = culled.state();
+  EXPECT_EQ(gb.size(), ga.size());
+  if (sequence.left == Sequence::Left::same_tags && ga.size() == gb.size())
+    EXPECT_LE(largest_difference(ga, gb, &Granule::x), 1e-9 * diameter);
+  if (never.rank() == 0) std::printf("%s: %g interior before, %g after\n", sequence.name.c_str(), before, after);
+}
+
+const std::string left_half = "region left block INF 0.013 INF INF INF INF units box\n";
+const std::string inner = "region inner block 0.008 0.018 0.008 0.018 0.004 0.012 units box\n";
+const std::string counts = "variable n equal count(all)\nvariable m equal mass(all)\nvariable z equal xcm(all,z)\n"
+                           "variable top equal bound(all,zmax)\nvariable low equal bound(all,zmin)\n";
+const std::vector<std::string> counted = {"n", "m", "z", "top", "low"};
+constexpr auto other_tags = Sequence::Left::other_tags;
+constexpr auto all_exterior = Sequence::Then::exterior;
+
+INSTANTIATE_TEST_SUITE_P(
+    Sequences, BetweenRuns,
+    testing::Values(
+        Sequence{"group_by_region", left_half + "group left region left\n", {"left"}, {}},
+        Sequence{"group_by_type_and_id", "group some id < 400\ngroup kind type 1\n", {"some", "kind"}, {}},
+        Sequence{"group_algebra",
+                 left_half + "group left region left\ngroup right subtract all left\ngroup both union left right\n"
+                             "group none intersect left right\n",
+                 {"left", "right", "both"},
+                 {}},
+        Sequence{"group_and_delete_it", left_half + "group a region left\ngroup a delete\ngroup b id < 30\n", {"b"}, {}},
+        Sequence{"group_sums", left_half + "group left region left\nvariable n equal count(left)\nvariable m equal mass(left)\n",
+                 {"left"}, {"n", "m"}},
+        Sequence{"variables", counts, {}, counted},
+        Sequence{"region_variables", inner + "variable n equal count(all,inner)\nvariable m equal mass(all,inner)\n", {}, {"n", "m"}},
+        Sequence{"one_granule_by_number", "variable h equal z[500]\nvariable d equal x[20]-x[10]\n", {}, {"h", "d"}},
+        Sequence{"print", "print \"there are $(count(all)) granules\"\nvariable n equal count(all)\n", {}, {"n"}},
+        Sequence{"print_in_if", "variable n equal count(all)\nif \"${n} > 1000\" then \"set type 1 type 1\" \"print '${n}'\"\n",
+                 {}, {"n"}},
+        Sequence{"set_the_type_they_have", "set type 1 type 1\n", {}, {}},
+        Sequence{"set_type_of_all", "set group all type 1\n", {}, {}, Sequence::Left::same_tags, all_exterior},
+        Sequence{"set_size_of_few", "set atom 600 diameter 0.00255\nset atom 601 diameter 0.001\n", {}, {}},
+        Sequence{"set_density", "group few id 100 200\nset group few density 2600\n", {"few"}, {}},
+        Sequence{"set_place", "set atom 600 z 0.05\nset atom 601 x 0.012 y 0.012 z 0.06\n", {}, {}},
+        Sequence{"set_velocity", "set atom 600 vx 0.1 vz 0.2\n", {}, {}},
+        Sequence{"velocity_of_few", "group few id 100 200 300\nvelocity few set 0.1 0 0.2\n", {"few"}, {}},
+        Sequence{"velocity_of_all", "velocity all set 0 0 0.1\n", {}, {}, Sequence::Left::same_tags, all_exterior},
+        Sequence{"velocity_ramp", "group few id < 20\nvelocity few ramp vx 0 0.1 z 0 0.02 units box\n", {"few"}, {}},
+        Sequence{"displace_few", "group few id 100 200 300\ndisplace_atoms few move 0 0 0.04 units box\n", {"few"}, {}},
+        Sequence{"displace_across", "group few id 100 200 300 400\ndisplace_atoms few move 0.003 0.002 0.03 units box\n", {"few"}, {}},
+        Sequence{"displace_all", "displace_atoms all move 0 0 0.02 units box\n", {}, {}, Sequence::Left::same_tags, all_exterior},
+        Sequence{"delete_by_region", inner + "delete_atoms region inner compress no\n" + counts, {}, counted},
+        Sequence{"delete_by_group", "group few id 100 200 300\ndelete_atoms group few compress no\n" + counts, {}, counted},
+        Sequence{"delete_twice",
+                 "group few id 100 200 300\ndelete_atoms group few compress no\ngroup more id 101 201\n"
+                 "delete_atoms group more compress no\n" + counts,
+                 {}, counted},
+        Sequence{"delete_and_renumber", inner + "delete_atoms region inner\n" + counts, {}, counted, other_tags, all_exterior},
+        Sequence{"delete_many", "group many id > 1000\ndelete_atoms group many compress no\n", {}, {}, Sequence::Left::same_tags,
+                 all_exterior},
+        Sequence{"create_one", "create_atoms 1 single 0.013 0.013 0.05 units box\ngroup new id > 1300\n"
+                               "set group new diameter 0.0026 density 2500\n",
+                 {"new"}, {}},
+        Sequence{"create_into_the_bed", "set atom 700 z 0.05\ncreate_atoms 1 single 0.013 0.013 0.05 units box\ngroup new id > 1300\n"
+                                        "set group new diameter 0.001 density 2500\nset group new z 0.01\n",
+                 {"new"}, {}},
+        Sequence{"write_data", "write_data between.data\n" + counts, {}, counted},
+        Sequence{"write_dump", "write_dump all custom between.dump id x y z\n" + counts, {}, counted},
+        Sequence{"write_restart", left_half + "group left region left\nwrite_restart between.restart\nset atom 600 vz 0.2\n",
+                 {"left"}, {}},
+        Sequence{"change_box", "change_box all boundary m m m\n", {}, {}, Sequence::Left::same_tags, all_exterior},
+        Sequence{"reset_timestep", "reset_timestep 0\nset atom 600 vz 0.2\n", {}, {}},
+        Sequence{"several_at_once",
+                 left_half + "group left region left\nset atom 600 vz 0.2\ndisplace_atoms left move 0 0 0\n"
+                             "group few id 1 2 3\ndelete_atoms group few compress no\nvelocity few set NULL NULL 0.01\n",
+                 {"left"}, {}}),
+    [](const auto& p) { return p.param.name; });
+
+}  // namespace
+}  // namespace decks
