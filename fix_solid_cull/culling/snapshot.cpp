@@ -112,7 +112,9 @@ void Snapshot::read(const std::vector<double>& state) {
   const double* const h = state_.data();
   scales_.set(h[diameter], h[gravity]);
   gravity_.set_at_last_look(vec(h + gravity_x));
-  ports_.run.reset_by += ports_.run.step - static_cast<std::int64_t>(h[step]);
+  const std::int64_t then = static_cast<std::int64_t>(h[step]);
+  ports_.run.reset_by += ports_.run.step - then;
+  ports_.run.step = then;
   const bool first = ports_.ranks.me == 0;
   solid_.set_counters({first ? h[counters] : 0, first ? h[counters + 1] : 0, h[counters + 2], first ? h[counters + 3] : 0});
 

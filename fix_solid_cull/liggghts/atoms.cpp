@@ -2,7 +2,7 @@
 
 #include <mpi.h>
 
-#include <cstdio>
+#include <algorithm>
 
 #include "atom.h"
 #include "domain.h"
@@ -92,7 +92,13 @@ void EngineAtoms::publish_counts(std::int64_t returned) {
   LAMMPS_NS::bigint here = atom->nlocal;
   MPI_Allreduce(&here, &atom->natoms, 1, MPI_LMP_BIGINT, MPI_SUM, world);
   if (output->thermo) engine::expect_atoms(*output->thermo, static_cast<long>(returned));
-  if (!map_cleared_) return;
+  // a command may have made the map anew while granules with higher tags were stored
+  const int highest_here = atom->nlocal ? *std::max_element(atom->tag, atom->tag + atom->nlocal) : 0;
+  int highest = 0;
+  MPI_Allreduce(&highest_here, &highest, 1, MPI_INT, MPI_MAX, world);
+  const bool outgrown = atom->map_style && highest >= atom->get_map_size();
+  if (outgrown) atom->map_init();
+  if (!map_cleared_ && !outgrown) return;
   atom->nghost = 0;
   atom->map_set();
   map_cleared_ = false;

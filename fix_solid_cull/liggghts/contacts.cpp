@@ -21,7 +21,7 @@ NeighbourRows EngineContacts::neighbours() const {
 void EngineContacts::forget_neighbours() {
   for (int l = 0; l < neighbor->nlist; ++l)
     if (neighbor->lists[l]) neighbor->lists[l]->inum = 0;
-  lists_are_void = true;
+  leave_lists(lmp);
 }
 
 /// `neigh_modify exclude` would do it, at a test for every candidate pair: neighbour builds take 1.7 times as long with it.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -18,11 +19,12 @@
 
 namespace solidcull {
 
-bool lists_are_void = false;
-
 namespace {
 
+std::set<const LAMMPS_NS::LAMMPS*> with_void_lists;
 bool histories_stay = false;  // in delete_atoms
+
+bool lists_are_void(const LAMMPS_NS::LAMMPS* lmp) { return with_void_lists.count(lmp) != 0; }
 
 FixSolidCull* fix_of(LAMMPS_NS::LAMMPS* lmp) {
   if (!lmp->modify) return nullptr;
@@ -91,13 +93,13 @@ MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, 
   const bool reads = sight == Sight::whole_bed || sight == Sight::all_restored;
   FixSolidCull* fix = fix_of(lmp);
   if (reads) refuse_part_of_a_bed(lmp, fix, std::string("before '") + command + "'");
-  if (sight == Sight::run && (lists_are_void || (fix && has_commands(words, n)))) set_up_after_all(words, n);
+  if (sight == Sight::run && (lists_are_void(lmp) || (fix && has_commands(words, n)))) set_up_after_all(words, n);
   if (fix && !fix->in_run()) {
     if (sight == Sight::state) fix->hide_bed();
     if (sight == Sight::whole_bed) show(lmp, *fix);
     if (sight == Sight::all_restored) fix->restore_all(command);
   }
-  histories_stay = lists_are_void && std::strcmp(command, "delete_atoms") == 0;
+  histories_stay = lists_are_void(lmp) && std::strcmp(command, "delete_atoms") == 0;
   step_ = lmp->update->ntimestep;
   resets_ = std::strcmp(command, "reset_timestep") == 0;
 }
@@ -120,8 +122,10 @@ void met_formula(LAMMPS_NS::LAMMPS* lmp, const char* formula) {
 
 void run_begins(LAMMPS_NS::LAMMPS* lmp) {
   if (FixSolidCull* fix = fix_of(lmp)) fix->run_begins();
-  lists_are_void = false;
+  with_void_lists.erase(lmp);
 }
+
+void leave_lists(LAMMPS_NS::LAMMPS* lmp) { with_void_lists.insert(lmp); }
 
 bool leaves_histories() {
   const bool leaves = histories_stay;

@@ -28,9 +28,9 @@ void met_formula(LAMMPS_NS::LAMMPS* lmp, const char* formula);
 /// Before the engine sets up a run. Collective.
 void run_begins(LAMMPS_NS::LAMMPS* lmp);
 
-/// What the engine's neighbour lists say is void, and contact histories are with the atoms: set where culled granules came out
-/// between runs, until the next run sets up.
-extern bool lists_are_void;
+/// From here on what the engine's neighbour lists say is void, and contact histories are with the atoms, until the next run sets
+/// up: culled granules have come out between runs.
+void leave_lists(LAMMPS_NS::LAMMPS* lmp);
 /// delete_atoms would take contact histories from the lists; asked once by it, says whether to leave them.
 bool leaves_histories();
 
