@@ -139,6 +139,21 @@ class Restart(Case):
                      "the granules that the restart file holds besides the atoms would be lost: put a run, or 'run 0', before "
                      "'unfix cull'", SOME)
 
+    def test_commands_that_would_see_a_part_of_the_bed(self):
+        late = "the granules that the restart file holds besides the atoms come with the first run: put 'run 0' before {}"
+        for command, named in (("group left region L\n", "'group'"), ("velocity all set 0 0 0\n", "'velocity'"),
+                               ("set group all density 2500\n", "'set'"), ("delete_atoms region L\n", "'delete_atoms'"),
+                               ("variable n equal count(all)+1\nprint \"$n\"\n", "the variable 'count(all)+1'")):
+            region = "region L block INF 0.01 INF INF INF INF units box\n"
+            self.refuses(lambda file, c=command: resumed(file, f"{region}{CULL_BLOCK}\n{c}run 10\n"), late.format(named), ((2, 1),))
+            self.refuses(lambda file, c=command: resumed(file, f"{region}{c}{CULL_BLOCK}\nrun 10\n"),
+                         self.UNCLAIMED + f", and 'run 0' before {named}", ((1, 2),))
+
+    def test_commands_after_the_first_run_see_the_whole_bed(self):
+        seen = f"{CULL_BLOCK}\nrun 0\nvariable n equal count(all)\nif \"$n != {GRANULES}\" then \"print 'wrong'\" \"quit\"\n"
+        self.goes_on(lambda file: resumed(file, seen, f"group low id < 100\nset group low density 2500\nrun {AFTER}\n", END),
+                     ((1, 1), (2, 3)))
+
     def test_a_file_without_culled_granules_needs_no_fix(self):
         file = self.place / "whole.restart"
         self.accepted(BLOCK + f"{CULL_BLOCK}\nrun 0\nwrite_restart {file}\n")

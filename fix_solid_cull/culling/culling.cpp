@@ -94,8 +94,9 @@ void Culling::set_up_atoms() {
     p_.shown.show();  // this deck may hold or drive what the one before did not
     p_.shown.hide();
   }
-  take_changes();
-  p_.closure.begin_run();
+  const bool other_walls = p_.walls.walls_are_others();
+  take_changes(other_walls);
+  p_.closure.begin_run(other_walls);
   open_for_insertion();
   change();
   p_.closure.run_has_begun();
@@ -229,6 +230,7 @@ void Culling::write_outputs() {
 }
 
 void Culling::end_run() {
+  p_.walls.remember_walls();
   if (p_.solid.has_store()) p_.report.tell_run();
   if (phase_ == Phase::stepping) phase_ = Phase::between_runs;  // after `run 0` the first step is still to come, if `pre no`
 }
@@ -263,10 +265,10 @@ void Culling::hide_bed() {
 }
 
 /// What the deck did to culled granules between runs.
-void Culling::take_changes() {
+void Culling::take_changes(bool other_walls) {
   if (!p_.shown.changed()) return;
   if (p_.lost.forget_lost()) settle_bodies();
-  p_.closure.begin_run();
+  p_.closure.begin_run(other_walls);
   change();
   p_.shown.give_changes();
   take_arrivals();

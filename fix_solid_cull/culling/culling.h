@@ -73,7 +73,7 @@ class Culling {
 
   void find_scales();
   void leave_lists();
-  void take_changes();
+  void take_changes(bool other_walls);
   void take_arrivals();
   void settle_bodies();
   void refuse_what_lies_too_far() const;

@@ -188,6 +188,8 @@ class Walls {
   virtual bool near(const WallTriangle& t, const Sphere& s, double gap) const = 0;
   virtual bool primitive_near(const Sphere& s, double gap) const = 0;
   virtual std::vector<std::string> names() const = 0;  ///< sorted: to see that one has gone
+  /// Numbers that are others if a wall that stands still was made, taken away, moved or changed since; between runs. Local.
+  virtual std::vector<double> fingerprint() const = 0;
   /// What still elements of meshes that report their load did to the granule in this step.
   virtual std::vector<WallLoad> loads_on(std::int64_t tag) = 0;
   /// A mesh element bears this in addition (N, N m about the mesh's point of reference), in this step.

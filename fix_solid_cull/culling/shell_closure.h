@@ -49,7 +49,7 @@ class ShellClosure : public BodyFollower {
   void unlocked(int i) { rows_[i].version = Cleared::never; }
 
   /// A run begins: walls may be others, and stored granules at them are atoms until they are seen to rest.
-  void begin_run() { new_run_ = true; }
+  void begin_run(bool other_walls) { new_run_ = other_walls; }
   void run_has_begun() { new_run_ = false; }
 
   /// Ranks tell each other what they have that is exterior, or the shell of another body. Collective.

@@ -11,24 +11,31 @@ namespace {
 constexpr double most_comparisons = 2e8;
 // likewise where more than this share of all that is locked was changed
 constexpr double most_changed = 0.25;
-
-/// Of the numbers' bits (FNV-1a by words).
-std::uint64_t sum_of(const std::vector<double>& numbers) {
-  std::uint64_t sum = 14695981039346656037u;
-  for (const double& x : numbers) {
-    std::uint64_t word;
-    std::memcpy(&word, &x, sizeof word);
-    sum = (sum ^ word) * 1099511628211u;
-    sum ^= sum >> 29;
-  }
-  return sum;
-}
+// so many granules' rows are kept for the next time: decks loop over commands and runs
+constexpr std::size_t worth_freeing = 100000;
 
 bool same_bits(const Vec3& a, const Vec3& b) { return std::memcmp(a.data(), b.data(), sizeof(Vec3)) == 0; }
 
 }  // namespace
 
 // ------------------------------------------------------------------------------------------------------------ out
+
+/// Of the numbers' bits (FNV-1a by words).
+std::uint64_t ShownBed::sum_of(const std::vector<double>& record) const {
+  std::uint64_t sum = 14695981039346656037u;
+  auto motion = motion_words_.begin();
+  for (std::size_t k = 0; k < record.size(); ++k) {
+    if (motion != motion_words_.end() && static_cast<std::size_t>(*motion) == k) {
+      ++motion;
+      continue;
+    }
+    std::uint64_t word;
+    std::memcpy(&word, &record[k], sizeof word);
+    sum = (sum ^ word) * 1099511628211u;
+    sum ^= sum >> 29;
+  }
+  return sum;
+}
 
 void ShownBed::show() {
   names_.assign(static_cast<std::size_t>(ports_.atoms.room), Name());
@@ -49,43 +56,36 @@ void ShownBed::show_interface() {
       atoms.set_velocity(i, e.velocity);
       atoms.set_spin(i, e.spin);
     }
-    note(i, false);
+    note(i, false, 0);
   }
 }
 
 void ShownBed::show_stored() {
   Atoms& atoms = ports_.atoms;
-  std::vector<std::int64_t> tags;
-  solid_.store().for_each([&](const Resident& g) { tags.push_back(g.tag); });
-  std::vector<double> record;
-  for (const std::int64_t tag : tags) {
-    const StoredGranule g = solid_.store().get(tag);
-    solid_.store().record(tag, record);
+  const bool by_place = !ports_.run.any_periodic() || scales_.compact();
+  const Vec3 middle = 0.5 * (ports_.run.box.lo + ports_.run.box.hi);
+  motion_words_.clear();
+  solid_.store().for_each_record([&](const StoredGranule& g, const std::vector<double>& record, bool transient_known) {
     const int i = atoms.put_back(record, g.layout);
-    if (!solid_.store().transient_known(tag)) {
+    if (motion_words_.empty()) motion_words_ = atoms.motion_words(i, by_place);
+    if (!transient_known) {
       const SolidBody& body = solid_.bodies().body(g.body);
       const Vec3 x = body.pose.to_world(g.position);
-      const Vec3 near = scales_.compact() ? Vec3(0.5 * (ports_.run.box.lo + ports_.run.box.hi)) : atoms.place(i);
-      atoms.set_place(i, solid_.nearest_image(x, near));
+      atoms.set_place(i, solid_.nearest_image(x, scales_.compact() ? middle : atoms.place(i)));
       atoms.set_velocity(i, body.twist.at(x));
       atoms.set_spin(i, body.twist.spin);
     }
-    atoms.mark_interface(i, false);
     shell_.label(i, groups_.key_of(g.body));
-    note(i, true);
-  }
-  if (!tags.empty())
-    motion_words_ = atoms.motion_words(atoms.owned - 1, !ports_.run.any_periodic() || scales_.compact());
+    note(i, true, sum_of(record));
+    atoms.mark_interface(i, false);
+  });
 }
 
-void ShownBed::note(int i, bool stored) {
-  Atoms& atoms = ports_.atoms;
-  std::vector<double> record;
-  int layout = 0;
-  atoms.pack(i, record, layout);
+void ShownBed::note(int i, bool stored, std::uint64_t sum) {
+  const Atoms& atoms = ports_.atoms;
   names_[static_cast<std::size_t>(i)] = {ports_.ranks.me, static_cast<std::int32_t>(granules_.size())};
-  granules_.push_back({atoms.tag[i], stored, false, atoms.place(i), atoms.velocity(i), atoms.spin(i), atoms.radius[i], atoms.mass[i],
-                       atoms.type[i], sum_of(record)});
+  granules_.push_back({atoms.tag[i], stored, false, atoms.place(i), atoms.velocity(i), atoms.spin(i), atoms.radius[i],
+                       atoms.mass[i], atoms.type[i], sum});
 }
 
 // ------------------------------------------------------------------------------------------------------------ back
@@ -116,6 +116,7 @@ void ShownBed::hide() {
       wake_.ask(granules_[static_cast<std::size_t>(number)].place, scales_.wake_up().radius(1));
   }
   shown_ = false;
+  if (granules_.capacity() < worth_freeing) return;
   names_ = {};
   granules_ = {};
   interface_ = {};
@@ -176,21 +177,19 @@ void ShownBed::judge(std::size_t number, int i) {
   }
   if (atoms.tag[i] != s.tag)
     throw InternalError("granule " + std::to_string(s.tag) + " was renumbered as " + std::to_string(atoms.tag[i]));
-  std::vector<double> record;
-  int layout = 0;
-  atoms.pack(i, record, layout);
-  const bool same = sum_of(record) == s.sum;
   // what walls and cover knew of an interface granule does not come back with it from another rank
-  const bool changed = (!same && !is_as_shown(s, i)) || (s.has_been_away && !s.stored);
+  const bool changed = !is_as_shown(s, i) || (s.has_been_away && !s.stored);
   if (changed || !atoms.may_be_culled(i)) wakes();  // or the deck holds or drives it from now on
-  if (changed) changes_[s.tag] = {false, layout, record};
-  if (s.stored) {
-    if (same || changed) return;
-    atoms.mark_interface(i, true);  // as it went into the store
-    atoms.pack(i, record, layout);
-    solid_.set_record(s.tag, layout, record, motion_words_);
-    return;
+  if (s.stored) atoms.mark_interface(i, true);  // as it went into the store
+  if (changed || s.stored) {
+    int layout = 0;
+    atoms.pack(i, record_, layout);
+    if (changed)
+      changes_[s.tag] = {false, layout, record_};
+    else if (sum_of(record_) != s.sum)
+      solid_.set_record(s.tag, layout, record_, motion_words_);
   }
+  if (s.stored) return;
   // until it wakes, or goes on in its body, it is as it was
   atoms.set_place(i, s.place);
   atoms.set_velocity(i, interface_[number].velocity);

@@ -54,7 +54,7 @@ class ShownBed : public FollowsAtoms {
     Vec3 place, velocity, spin;  // as shown
     double radius, mass;
     int type;
-    std::uint64_t sum;  // of all its numbers, as shown
+    std::uint64_t sum;  // of all its numbers but those of its motion, as shown
   };
   struct Interface {
     Locked state;
@@ -68,7 +68,8 @@ class ShownBed : public FollowsAtoms {
 
   void show_interface();
   void show_stored();
-  void note(int i, bool stored);
+  void note(int i, bool stored, std::uint64_t sum);
+  std::uint64_t sum_of(const std::vector<double>& record) const;
   bool is_as_shown(const Shown& s, int i) const;
   void bring_strangers_home(std::vector<int>& at);
   void judge(std::size_t number, int i);
@@ -86,7 +87,8 @@ class ShownBed : public FollowsAtoms {
   std::vector<Name> names_;           // by atom
   std::vector<Shown> granules_;       // by number
   std::vector<Interface> interface_;  // by number: the first ones are interface granules
-  std::vector<int> motion_words_;     // of a record
+  std::vector<int> motion_words_;     // of a record, in their order
+  std::vector<double> record_;        // of one granule
   std::vector<std::int64_t> asking_;  // those that are to wake
   std::map<std::int64_t, Change> changes_;
 };

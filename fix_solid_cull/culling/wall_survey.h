@@ -54,15 +54,27 @@ class WallSurvey {
   void update(const std::vector<WallContact>& contacts, bool new_run);
   /// At the start of a run: whether a wall of the run before is not there any more.
   bool a_wall_has_gone();
+  /// A run has ended.
+  void remember_walls() { fingerprint_ = fingerprint(); }
+  /// Whether walls that stand still may be others than at the end of the last run, on any rank. Collective.
+  bool walls_are_others() const { return ports_.ranks.any(fingerprint_ != fingerprint()); }
 
  private:
   // a granule still stands at a wall that is this share of its radius away, or nearer
   static constexpr double still_there = 0.01;
 
+  /// The skin too: it says what is near.
+  std::vector<double> fingerprint() const {
+    std::vector<double> f = ports_.walls.fingerprint();
+    f.push_back(ports_.run.skin);
+    return f;
+  }
+
   const Ports& ports_;
   const Shell& shell_;
   WakeRequests& wake_;
   PerGranule<AtWall> rows_;
+  std::vector<double> fingerprint_;
   std::vector<std::string> names_then_;
 };
 

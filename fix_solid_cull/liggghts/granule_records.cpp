@@ -42,20 +42,20 @@ int GranuleRecords::number_of(const Layout& layout) {
 }
 
 void GranuleRecords::pack(int i, std::vector<double>& record, int& layout) {
-  scratch_.resize(longest_column);
+  packed_.resize(longest_column);
   record.clear();
   lengths_.clear();
   const auto keep = [&](int length) {
     lengths_.push_back(length);
-    record.insert(record.end(), scratch_.begin(), scratch_.begin() + length);
+    record.insert(record.end(), packed_.begin(), packed_.begin() + length);
   };
   {
     AtomStyleOnly guard(atom);
-    keep(atom->avec->pack_exchange(i, scratch_.data()));
+    keep(atom->avec->pack_exchange(i, packed_.data()));
   }
   for (int e = 0; e < atom->nextra_grow; ++e) {
     LAMMPS_NS::Fix* fix = modify->fix[atom->extra_grow[e]];
-    if (fix != own_) keep(fix->pack_exchange(i, scratch_.data()));
+    if (fix != own_) keep(fix->pack_exchange(i, packed_.data()));
   }
   layout = last_layout_;
   if (!is_last_layout()) {
@@ -108,26 +108,33 @@ std::vector<int> GranuleRecords::motion_words(int i, bool positions) {
 }
 
 void GranuleRecords::remove(int i) {
-  atom->avec->copy(atom->nlocal - 1, i, 1);
+  if (i != atom->nlocal - 1) atom->avec->copy(atom->nlocal - 1, i, 1);
   atom->nlocal--;
 }
 
 int GranuleRecords::append(const std::vector<double>& record, int layout) {
   const int i = atom->nlocal;
   if (i == atom->nmax) atom->avec->grow(0);
-  scratch_.assign(record.begin(), record.end());
+  unpacked_.assign(record.begin(), record.end());
   const Layout& columns = layouts_[layout];
   {
     AtomStyleOnly guard(atom);
-    atom->avec->unpack_exchange(scratch_.data());
+    atom->avec->unpack_exchange(unpacked_.data());
   }
+  auto next = columns.begin() + 1;
+  int next_at = columns.front().length;
   for (int e = 0; e < atom->nextra_grow; ++e) {
     LAMMPS_NS::Fix* fix = modify->fix[atom->extra_grow[e]];
+    if (next != columns.end() && next->fix == fix->id) {  // as a rule columns stand in the order of fixes
+      fix->unpack_exchange(i, &unpacked_[next_at]);
+      next_at += (next++)->length;
+      continue;
+    }
     int at = columns.front().length;
     auto column = columns.begin() + 1;
     while (column != columns.end() && column->fix != fix->id) at += (column++)->length;
     if (column != columns.end())
-      fix->unpack_exchange(i, &scratch_[at]);
+      fix->unpack_exchange(i, &unpacked_[at]);
     else
       fix->set_arrays(i);
   }

@@ -45,7 +45,7 @@ class GranuleRecords : protected LAMMPS_NS::Pointers {
   std::vector<Layout> layouts_;
   int last_layout_ = -1;
   std::vector<int> lengths_;
-  std::vector<double> scratch_;
+  std::vector<double> packed_, unpacked_;  // of one granule
 };
 
 }  // namespace solidcull

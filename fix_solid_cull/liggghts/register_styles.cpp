@@ -20,6 +20,7 @@
 #include "solidcull.h"
 #include "update.h"
 #include "variable.h"
+#include "wall_contacts.h"
 
 namespace {
 
@@ -47,6 +48,7 @@ void Modify::add_fix(int narg, char** arg, char* suffix) {
   using Original = void (*)(Modify*, int, char**, char*);
   static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Modify7add_fixEiPPcS1_");
   solidcull::engine::fix_styles(*this)["solid/cull"] = make_fix;
+  if (narg > 2) solidcull::WallContacts::fix_was_made(arg[2]);
   original(this, narg, arg, suffix);
 }
 

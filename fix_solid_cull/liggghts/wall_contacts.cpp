@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 
 #include "atom.h"
+#include "domain.h"
 #include "fix_mesh_surface.h"
 #include "fix_neighlist_mesh.h"
 #include "fix_wall_gran.h"
@@ -19,6 +22,8 @@ using LAMMPS_NS::FixWallGran;
 using LAMMPS_NS::TriMesh;
 
 namespace {
+
+std::int64_t made = 0;  // fixes that walls depend on, in this process
 
 WallTriangle triangle(TriMesh* mesh, int number, int index) {
   WallTriangle t{number, index, {}, {Vec3::Constant(HUGE_VAL), Vec3::Constant(-HUGE_VAL)}, mesh->isMoving()};
@@ -101,6 +106,35 @@ std::vector<WallTriangle> WallContacts::triangles() const {
     for (int t = 0; t < count; ++t) all.push_back(triangle(meshes_[m], static_cast<int>(m), t));
   }
   return all;
+}
+
+void WallContacts::fix_was_made(const char* style) {
+  for (const char* of_walls : {"wall/", "mesh/", "move/mesh", "property/global"})
+    if (std::strncmp(style, of_walls, std::strlen(of_walls)) == 0) ++made;
+}
+
+std::vector<double> WallContacts::fingerprint() const {
+  std::vector<double> f = {static_cast<double>(made)};
+  for (FixWallGran* wall : walls_) {
+    f.insert(f.end(), {double(wall->groupbit), double(wall->is_moving())});
+    if (wall->is_mesh_wall()) continue;
+    for (int corner = 0; corner < 8; ++corner) {  // how far a primitive is from the corners of the box tells where it is
+      double x[3], to_wall[3];
+      for (int d = 0; d < 3; ++d) x[d] = corner >> d & 1 ? domain->boxhi[d] : domain->boxlo[d];
+      f.push_back(wall->primitiveWall()->resolveContact(x, 0, to_wall));
+    }
+  }
+  for (TriMesh* mesh : meshes_) {
+    f.insert(f.end(), {double(mesh->isMoving()), double(mesh->sizeLocal() + mesh->sizeGhost())});
+    for (int t = 0; !mesh->isMoving() && t < mesh->sizeLocal() + mesh->sizeGhost(); ++t)
+      for (int k = 0; k < 3; ++k) {
+        double node[3];
+        mesh->node(t, k, node);
+        f.insert(f.end(), node, node + 3);
+      }
+  }
+  for (const std::string& name : names()) f.insert(f.end(), name.begin(), name.end());
+  return f;
 }
 
 std::vector<std::string> WallContacts::names() const {

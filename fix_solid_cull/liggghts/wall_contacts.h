@@ -33,6 +33,10 @@ class WallContacts : protected LAMMPS_NS::Pointers {
 
   /// IDs of the walls and their meshes, sorted: to see that one has gone.
   std::vector<std::string> names() const;
+  /// See Walls::fingerprint.
+  std::vector<double> fingerprint() const;
+  /// A fix of this style was made: what walls are made of, or how they move, may be other.
+  static void fix_was_made(const char* style);
 
  private:
   std::vector<LAMMPS_NS::FixWallGran*> walls_;

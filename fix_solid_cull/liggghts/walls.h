@@ -27,6 +27,7 @@ class EngineWalls : public Walls {
   bool near(const WallTriangle& t, const Sphere& s, double gap) const override { return contacts_.near(t, s, gap); }
   bool primitive_near(const Sphere& s, double gap) const override { return contacts_.primitive_near(s, gap); }
   std::vector<std::string> names() const override { return contacts_.names(); }
+  std::vector<double> fingerprint() const override { return contacts_.fingerprint(); }
   std::vector<WallLoad> loads_on(std::int64_t tag) override { return loads_.of(tag); }
   void press(int mesh, int element, const Vec3& force, const Vec3& torque) override {
     loads_.press(mesh, element, force, torque);

@@ -139,6 +139,16 @@ class GranuleStore {
     const auto grid = grids_.find(frame);
     if (grid != grids_.end()) for_each_slot_in_box(grid->second, lo, hi, [&](int slot) { visit(resident(slot)); });
   }
+  /// Calls visit(const StoredGranule&, record, whether its transient words are known) for all, in no order.
+  template <class Visit>
+  void for_each_record(Visit visit) const {
+    std::vector<double> record;
+    for (int s = 0; s < static_cast<int>(slots_.size()); ++s) {
+      if (tag_at(s) == free_mark) continue;
+      read_record(s, record);
+      visit(granule(s), record, transient_.of_tag.contains(tag_at(s)));
+    }
+  }
   /// Calls visit(const Resident&) for each granule of this body; costs what is in its box.
   template <class Visit>
   void for_each_of_body(int body, Visit visit) const {

@@ -607,6 +607,19 @@ bool SmallWalls::primitive_near(const Sphere& s, double gap) const {
                      [&](const SmallDeck::Plane& p) { return (s.centre - p.point).dot(p.normal) - s.radius < gap; });
 }
 
+std::vector<double> SmallWalls::fingerprint() const {
+  std::vector<double> f;
+  for (const SmallDeck::Plane& p : world_.deck.planes)
+    if (!p.moving)
+      for (const Vec3& v : {p.point, p.normal}) f.insert(f.end(), v.data(), v.data() + 3);
+  for (const SmallDeck::Mesh& m : world_.deck.meshes)
+    for (const auto& corners : m.triangles)
+      for (const Vec3& v : corners)
+        if (!m.moving) f.insert(f.end(), v.data(), v.data() + 3);
+  for (const std::string& name : names()) f.insert(f.end(), name.begin(), name.end());
+  return f;
+}
+
 std::vector<std::string> SmallWalls::names() const {
   std::vector<std::string> all;
   for (const SmallDeck::Plane& p : world_.deck.planes) all.push_back(p.name);

@@ -191,6 +191,7 @@ class SmallWalls : public Walls {
   bool near(const WallTriangle& t, const Sphere& s, double gap) const override;
   bool primitive_near(const Sphere& s, double gap) const override;
   std::vector<std::string> names() const override;
+  std::vector<double> fingerprint() const override;
   std::vector<WallLoad> loads_on(std::int64_t tag) override;
   void press(int mesh, int element, const Vec3& force, const Vec3& torque) override;
 
