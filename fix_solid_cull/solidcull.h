@@ -7,8 +7,8 @@
 extern "C" {
 #endif
 
-/* Makes `fix … solid/cull` known to this instance before its first fix is made. Nothing needs to call it. lammps: what lammps_open
-   gave, or a LAMMPS*. Local. */
+/* Makes `fix … solid/cull` known to this instance before its first fix is made. A program that has loaded this library too late
+   reads why then, instead of "Invalid fix style". lammps: what lammps_open gave, or a LAMMPS*. Local. */
 void solidcull_register(void* lammps);
 
 /* The version, as "major.minor.patch". */

@@ -6,14 +6,17 @@ set(LIGGGHTS_LINK_LIBRARIES "" CACHE STRING "what a static LIGGGHTS needs beside
 set(SOLIDCULL_TRIED_ENGINE "LIGGGHTS-PUBLIC 3.8.0")
 
 # an indented message is one line on the screen
-function(refuse_engine text)
+function(refuse_engine)
+  string(CONCAT text ${ARGN})
   message(FATAL_ERROR " solidcull: ${text}")
 endfunction()
 
 # --- library and headers -------------------------------------------------------------------------
-# Headers that were found for one library are none for another, and a library of the user's has its own.
+# Headers that were found for one library are none for another, and a library of the user's has its own. What the command line has
+# just named has no type yet.
+get_property(type CACHE LIGGGHTS_INCLUDE_DIR PROPERTY TYPE)
 if(SOLIDCULL_HEADERS_FOUND AND NOT LIGGGHTS_LIBRARY STREQUAL SOLIDCULL_HEADERS_FOUND_FOR
-   AND LIGGGHTS_INCLUDE_DIR STREQUAL SOLIDCULL_HEADERS_FOUND)
+   AND LIGGGHTS_INCLUDE_DIR STREQUAL SOLIDCULL_HEADERS_FOUND AND NOT type STREQUAL UNINITIALIZED)
   unset(LIGGGHTS_INCLUDE_DIR CACHE)
 endif()
 set(only_near)
@@ -25,29 +28,34 @@ if(NOT LIGGGHTS_LIBRARY)
   refuse_engine("LIGGGHTS_LIBRARY was not found: install libliggghts-dev, or name your own with -DLIGGGHTS_LIBRARY=…")
 endif()
 if(NOT EXISTS "${LIGGGHTS_LIBRARY}" OR IS_DIRECTORY "${LIGGGHTS_LIBRARY}")
-  refuse_engine("LIGGGHTS_LIBRARY is '${LIGGGHTS_LIBRARY}', and there is no such file: name libliggghts.so, liblmp_NAME.so or liblmp_NAME.a")
+  refuse_engine("LIGGGHTS_LIBRARY is '${LIGGGHTS_LIBRARY}', and there is no such file: "
+                "name libliggghts.so, liblmp_NAME.so or liblmp_NAME.a")
 endif()
 get_filename_component(beside "${LIGGGHTS_LIBRARY}" DIRECTORY)
-if(NOT LIGGGHTS_INCLUDE_DIR)
-  find_path(LIGGGHTS_INCLUDE_DIR lammps.h HINTS ${beside} ${beside}/../include ${beside}/../../include PATH_SUFFIXES liggghts
-            DOC "folder that holds LIGGGHTS's lammps.h" ${only_near})
+set(headers_named "${LIGGGHTS_INCLUDE_DIR}")
+find_path(LIGGGHTS_INCLUDE_DIR lammps.h HINTS ${beside} ${beside}/../include ${beside}/../../include PATH_SUFFIXES liggghts
+          DOC "folder that holds LIGGGHTS's lammps.h" ${only_near})
+if(NOT headers_named)
   set(SOLIDCULL_HEADERS_FOUND "${LIGGGHTS_INCLUDE_DIR}" CACHE INTERNAL "")
   set(SOLIDCULL_HEADERS_FOUND_FOR "${LIGGGHTS_LIBRARY}" CACHE INTERNAL "")
 endif()
 if(NOT LIGGGHTS_INCLUDE_DIR)
-  refuse_engine("LIGGGHTS_INCLUDE_DIR was not found for ${LIGGGHTS_LIBRARY}: name the folder of its lammps.h, as -DLIGGGHTS_INCLUDE_DIR=…/src")
+  refuse_engine("LIGGGHTS_INCLUDE_DIR was not found for ${LIGGGHTS_LIBRARY}: "
+                "name the folder of its lammps.h, as -DLIGGGHTS_INCLUDE_DIR=…/src")
 endif()
 
 # --- headers -------------------------------------------------------------------------------------
 foreach(header lammps.h fix.h fix_contact_history.h fix_mesh_surface.h)
   if(NOT EXISTS "${LIGGGHTS_INCLUDE_DIR}/${header}")
-    refuse_engine("LIGGGHTS_INCLUDE_DIR is '${LIGGGHTS_INCLUDE_DIR}', which has no ${header}: name the folder of LIGGGHTS's headers, its src")
+    refuse_engine("LIGGGHTS_INCLUDE_DIR is '${LIGGGHTS_INCLUDE_DIR}', which has no ${header}: "
+                  "name the folder of LIGGGHTS's headers, its src")
   endif()
 endforeach()
 foreach(hook pre_initial_integrate pre_final_integrate)
   file(STRINGS "${LIGGGHTS_INCLUDE_DIR}/fix.h" found REGEX "virtual.*[^a-z_]${hook} *\\(")
   if(NOT found)
-    refuse_engine("the LIGGGHTS of '${LIGGGHTS_INCLUDE_DIR}' has no Fix::${hook}, as LIGGGHTS-PFM has not: use ${SOLIDCULL_TRIED_ENGINE}")
+    refuse_engine("the LIGGGHTS of '${LIGGGHTS_INCLUDE_DIR}' has no Fix::${hook}, as LIGGGHTS-PFM has not: "
+                  "use ${SOLIDCULL_TRIED_ENGINE}")
   endif()
 endforeach()
 
@@ -59,16 +67,19 @@ if(LIGGGHTS_LIBRARY MATCHES "\\.a$")
   set(engine_library "${CMAKE_BINARY_DIR}/libsolidcull-liggghts.so")
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${LIGGGHTS_LIBRARY}")
   separate_arguments(mpi_flags UNIX_COMMAND "${MPI_CXX_LINK_FLAGS}")
-  set(search_paths)
+  set(needs)
   foreach(library ${LIGGGHTS_LINK_LIBRARIES})
     if(IS_ABSOLUTE "${library}")
       get_filename_component(folder "${library}" DIRECTORY)
-      list(APPEND search_paths "-Wl,-rpath,${folder}")
+      list(APPEND needs "${library}" "-Wl,-rpath,${folder}")
+    else()
+      string(REGEX REPLACE "^-l" "" library "${library}")
+      list(APPEND needs "-l${library}")
     endif()
   endforeach()
   set(link ${CMAKE_CXX_COMPILER} -shared -o ${engine_library} -Wl,-soname,libsolidcull-liggghts.so -Wl,-z,defs
            -Wl,--whole-archive ${LIGGGHTS_LIBRARY} -Wl,--no-whole-archive
-           ${LIGGGHTS_LINK_LIBRARIES} ${search_paths} ${mpi_flags} ${MPI_CXX_LIBRARIES})
+           ${needs} ${mpi_flags} ${MPI_CXX_LIBRARIES})
   set(failed OFF)
   if("${LIGGGHTS_LIBRARY}" IS_NEWER_THAN "${engine_library}" OR NOT link STREQUAL SOLIDCULL_ENGINE_LINKED_BY)
     execute_process(COMMAND ${CMAKE_COMMAND} -E env LC_ALL=C ${link}
@@ -78,9 +89,11 @@ if(LIGGGHTS_LIBRARY MATCHES "\\.a$")
     set(SOLIDCULL_ENGINE_LINKED_BY "${link}" CACHE INTERNAL "")
   else()
     if(told MATCHES "recompile with -fPIC")
-      refuse_engine("${LIGGGHTS_LIBRARY} was compiled without -fPIC: compile LIGGGHTS with it (USE_FPIC = \"ON\" in MAKE/Makefile.user)")
+      refuse_engine("${LIGGGHTS_LIBRARY} was compiled without -fPIC: "
+                    "compile LIGGGHTS with it (USE_FPIC = \"ON\" in MAKE/Makefile.user)")
     elseif(told MATCHES "undefined reference to `([^']*)'")
-      refuse_engine("${LIGGGHTS_LIBRARY} needs more libraries, one of them for '${CMAKE_MATCH_1}': name them with -DLIGGGHTS_LINK_LIBRARIES=…")
+      refuse_engine("${LIGGGHTS_LIBRARY} needs more libraries, one of them for '${CMAKE_MATCH_1}': "
+                    "name them with -DLIGGGHTS_LINK_LIBRARIES=…")
     endif()
     string(REGEX REPLACE "\n.*" "" told "${told}")
     refuse_engine("${LIGGGHTS_LIBRARY} cannot be linked (${told}): name a static or shared library of LIGGGHTS")
@@ -91,7 +104,8 @@ set(looked_at ${CMAKE_BINARY_DIR}/CMakeFiles/engine)
 execute_process(COMMAND ${CMAKE_NM} -D -S --defined-only ${engine_library}
                 OUTPUT_FILE ${looked_at}.symbols ERROR_VARIABLE told RESULT_VARIABLE failed)
 if(failed)
-  refuse_engine("LIGGGHTS_LIBRARY is '${LIGGGHTS_LIBRARY}', which is no library: name libliggghts.so, liblmp_NAME.so or liblmp_NAME.a")
+  refuse_engine("LIGGGHTS_LIBRARY is '${LIGGGHTS_LIBRARY}', which is no library: "
+                "name libliggghts.so, liblmp_NAME.so or liblmp_NAME.a")
 endif()
 execute_process(COMMAND ${CMAKE_READELF} -rW ${engine_library} OUTPUT_FILE ${looked_at}.relocations ERROR_QUIET)
 
@@ -107,11 +121,13 @@ foreach(line ${interposed})
   string(REGEX REPLACE "_ZN9LAMMPS_NS[0-9]+([A-Za-z]+)[0-9]+([a-z_]+)E.*" "\\1::\\2" name "${symbol}")
   in_library(${symbol} found)
   if(NOT found)
-    refuse_engine("${LIGGGHTS_LIBRARY} shows no ${name}: name a library of ${SOLIDCULL_TRIED_ENGINE}, not its program")
+    refuse_engine("${LIGGGHTS_LIBRARY} shows no ${name}: "
+                  "name a library of ${SOLIDCULL_TRIED_ENGINE}, not its program")
   endif()
   file(STRINGS ${looked_at}.relocations found REGEX " ${symbol}([ @]|$)")
   if(NOT found)
-    refuse_engine("${LIGGGHTS_LIBRARY} cannot be made to call another ${name} than its own: link LIGGGHTS without -Bsymbolic, -Bsymbolic-functions")
+    refuse_engine("${LIGGGHTS_LIBRARY} cannot be made to call another ${name} than its own: "
+                  "link LIGGGHTS without -Bsymbolic, -Bsymbolic-functions")
   endif()
 endforeach()
 
@@ -142,7 +158,8 @@ else()
 endif()
 foreach(flag SUPERQUADRIC_ACTIVE_FLAG NONSPHERICAL_ACTIVE_FLAG CONVEX_ACTIVE_FLAG LAMMPS_SMALLSMALL LAMMPS_BIGBIG LAMMPS_SMALLBIG)
   if(flag IN_LIST named AND NOT flag IN_LIST built_with AND NOT flag STREQUAL default)
-    refuse_engine("LIGGGHTS_DEFINITIONS says ${flag}, and ${LIGGGHTS_LIBRARY} was built without it: leave it out, it is found by itself")
+    refuse_engine("LIGGGHTS_DEFINITIONS says ${flag}, and ${LIGGGHTS_LIBRARY} was built without it: "
+                  "leave it out, it is found by itself")
   endif()
 endforeach()
 set(engine_definitions ${named} ${built_with})
@@ -162,8 +179,8 @@ list(TRANSFORM with PREPEND -I)
 set(defined ${engine_definitions})
 list(TRANSFORM defined PREPEND -D)
 execute_process(
-  COMMAND ${CMAKE_COMMAND} -E env LC_ALL=C ${CMAKE_CXX_COMPILER} ${flags} -w -std=c++17 ${defined} ${with} ${MPI_CXX_COMPILE_OPTIONS}
-          -c ${probe} -o ${looked_at}.o
+  COMMAND ${CMAKE_COMMAND} -E env LC_ALL=C ${CMAKE_CXX_COMPILER} ${flags} -w -std=c++17 ${defined} ${with}
+          ${MPI_CXX_COMPILE_OPTIONS} -c ${probe} -o ${looked_at}.o
   RESULT_VARIABLE failed OUTPUT_VARIABLE told ERROR_VARIABLE told)
 if(failed)
   string(REGEX REPLACE "(^|.*\n)([^\n]*error[^\n]*)\n.*" "\\2" told "${told}")
@@ -177,7 +194,8 @@ foreach(line ${wanted})
   string(REGEX REPLACE ".* U " "" symbol "${line}")
   in_library(${symbol} found)
   if(NOT found AND symbol MATCHES "6LAMMPSC")
-    refuse_engine("${LIGGGHTS_LIBRARY} was built with another MPI than ${MPI_CXX_LIBRARIES}: name its compiler with -DMPI_CXX_COMPILER=…")
+    refuse_engine("${LIGGGHTS_LIBRARY} was built with another MPI than ${MPI_CXX_LIBRARIES}: "
+                  "name its compiler with -DMPI_CXX_COMPILER=…")
   elseif(NOT found)
     refuse_engine("${apart}, the library has no '${symbol}': ${name_them}")
   endif()

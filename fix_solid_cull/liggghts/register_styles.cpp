@@ -1,5 +1,6 @@
 // Makes the two styles known to an unmodified LIGGGHTS. Fix styles stand in a table; region styles in an if-chain, so the
-// engine's own Domain::add_region is interposed (interposed.h). So is the call by which a wall tells its mesh of a contact: loads of granules that are put away must be known.
+// engine's own Domain::add_region is interposed (interposed.h). So is the call by which a wall tells its mesh of a contact: loads
+// of granules that are put away must be known.
 #include <cstring>
 #include <string>
 
