@@ -20,6 +20,12 @@ struct Dynamic {
   Table calls, others;
 };
 
+/// The loader speaks of places in numbers.
+template <class T>
+const T* at_place(std::uintptr_t address) {
+  return reinterpret_cast<const T*>(address);  // NOLINT(performance-no-int-to-ptr)
+}
+
 bool holds(const dl_phdr_info& object, std::uintptr_t address) {
   for (int p = 0; p < object.dlpi_phnum; ++p) {
     const auto& part = object.dlpi_phdr[p];
@@ -32,14 +38,13 @@ bool holds(const dl_phdr_info& object, std::uintptr_t address) {
 Dynamic dynamic_of(const dl_phdr_info& object) {
   const ElfW(Dyn)* entry = nullptr;
   for (int p = 0; p < object.dlpi_phnum; ++p)
-    if (object.dlpi_phdr[p].p_type == PT_DYNAMIC)
-      entry = reinterpret_cast<const ElfW(Dyn)*>(object.dlpi_addr + object.dlpi_phdr[p].p_vaddr);
+    if (object.dlpi_phdr[p].p_type == PT_DYNAMIC) entry = at_place<ElfW(Dyn)>(object.dlpi_addr + object.dlpi_phdr[p].p_vaddr);
   Dynamic found;
   if (!entry) return found;
   // some loaders leave addresses as they are in the file
   const auto place = [&](const ElfW(Dyn) & e) {
     const std::uintptr_t at = e.d_un.d_ptr;
-    return reinterpret_cast<const char*>(at < object.dlpi_addr ? at + object.dlpi_addr : at);
+    return at_place<char>(at < object.dlpi_addr ? at + object.dlpi_addr : at);
   };
   for (; entry->d_tag != DT_NULL; ++entry) switch (entry->d_tag) {
       case DT_SYMTAB:
@@ -95,7 +100,7 @@ int look_at(dl_phdr_info* object, std::size_t, void* data) {
       const auto& relocation = *reinterpret_cast<const ElfW(Rel)*>(table.first + at);
       const std::size_t number = symbol_number(relocation);
       if (number == 0 || std::strcmp(dynamic.names + dynamic.symbols[number].st_name, search.symbol) != 0) continue;
-      search.targets.push_back(*reinterpret_cast<const void* const*>(object->dlpi_addr + relocation.r_offset));
+      search.targets.push_back(*at_place<const void*>(object->dlpi_addr + relocation.r_offset));
     }
   }
   return 1;  // no other object is looked at
