@@ -7,7 +7,7 @@
 
 namespace solidcull::engine {
 
-enum class Call { add_fix, begin_run, add_region, mesh_contact, neighbor_build };
+enum class Call { add_fix, begin_run, count_fixes, deck_command, formula, add_region, mesh_contact, neighbor_build };
 
 struct Interposed {
   Call call;
@@ -18,6 +18,9 @@ struct Interposed {
 inline constexpr Interposed interposed[] = {
     {Call::add_fix, "_ZN9LAMMPS_NS6Modify7add_fixEiPPcS1_", "Modify::add_fix"},
     {Call::begin_run, "_ZN9LAMMPS_NS6Modify4initEv", "Modify::init"},
+    {Call::count_fixes, "_ZN9LAMMPS_NS6Modify20n_fixes_style_strictEPKc", "Modify::n_fixes_style_strict"},
+    {Call::deck_command, "_ZN9LAMMPS_NS5Input15execute_commandEv", "Input::execute_command"},
+    {Call::formula, "_ZN9LAMMPS_NS8Variable8evaluateEPcPPNS0_4TreeE", "Variable::evaluate"},
     {Call::add_region, "_ZN9LAMMPS_NS6Domain10add_regionEiPPc", "Domain::add_region"},
     {Call::mesh_contact, "_ZN9LAMMPS_NS14FixMeshSurface25add_particle_contributionEiPdS1_iS1_",
      "FixMeshSurface::add_particle_contribution"},

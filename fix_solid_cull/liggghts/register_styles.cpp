@@ -68,7 +68,7 @@ void Modify::init() {
 /// delete_atoms asks whether there are contact histories, to take them from the neighbour lists.
 int Modify::n_fixes_style_strict(const char* style) {
   using Original = int (*)(Modify*, const char*);
-  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Modify20n_fixes_style_strictEPKc");
+  static const auto original = own<Call::count_fixes, Original>();
   if (std::strcmp(style, "contacthistory") == 0 && solidcull::leaves_histories()) return 0;
   return original(this, style);
 }
@@ -76,7 +76,7 @@ int Modify::n_fixes_style_strict(const char* style) {
 /// Each command of a deck, however it comes.
 int Input::execute_command() {
   using Original = int (*)(Input*);
-  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS5Input15execute_commandEv");
+  static const auto original = own<Call::deck_command, Original>();
   const solidcull::MetCommand met(lmp, command, command_map->count(command) > 0, arg, narg);
   return original(this);
 }
@@ -84,7 +84,7 @@ int Input::execute_command() {
 /// Formulas are evaluated between runs too, where a command names a variable.
 double Variable::evaluate(char* str, Tree** tree) {
   using Original = double (*)(Variable*, char*, Tree**);
-  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS8Variable8evaluateEPcPPNS0_4TreeE");
+  static const auto original = own<Call::formula, Original>();
   solidcull::met_formula(lmp, str);
   return original(this, str, tree);
 }
