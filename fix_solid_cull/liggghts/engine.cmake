@@ -127,7 +127,7 @@ foreach(line ${interposed})
   file(STRINGS ${looked_at}.relocations found REGEX " ${symbol}([ @]|$)")
   if(NOT found)
     refuse_engine("${LIGGGHTS_LIBRARY} cannot be made to call another ${name} than its own: "
-                  "link LIGGGHTS without -Bsymbolic, -Bsymbolic-functions")
+                  "build LIGGGHTS without -Bsymbolic-functions, -Ofast and -fno-semantic-interposition")
   endif()
 endforeach()
 

@@ -37,7 +37,7 @@ std::string find_out() {
     const std::vector<const void*> targets = call_targets(own, row.symbol);
     const std::string where = std::string(row.name) + " of this LIGGGHTS (" + file_of(own) + ")";
     if (targets.empty())
-      return "calls of " + where + " cannot be redirected: link LIGGGHTS without -Bsymbolic, -Bsymbolic-functions";
+      return "calls of " + where + " cannot be redirected: build LIGGGHTS without -Bsymbolic-functions, -Ofast";
     if (std::find(targets.begin(), targets.end(), own) != targets.end())
       return "calls of " + where + " do not come here: link or preload libsolidcull.so before LIGGGHTS is loaded";
   }
