@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
 # Makes build/ ready: installs what Debian 12 lacks (root, or a user with sudo), configures, builds.
-#   scripts/prepare.sh [TARGET...]      default: everything
-#   scripts/prepare.sh --configure      builds nothing
+#   scripts/prepare.sh [-DNAME=VALUE...] [TARGET...]      default: everything
+#   scripts/prepare.sh [-DNAME=VALUE...] --configure      builds nothing
+# Words that begin with -D go to cmake and are kept in build/: -DLIGGGHTS_LIBRARY=… names a LIGGGHTS of your own, see
+# fix_solid_cull/own_liggghts.md, and Debian's is not installed then.
 # What it ran quietly is in build/prepare.log. SOLIDCULL_JOBS sets the number of compilers at once. Other scripts set
 # SOLIDCULL_BUILD (another folder), SOLIDCULL_CMAKE (options of cmake), SOLIDCULL_PACKAGES (more of Debian's) and
 # SOLIDCULL_ENGINE=OFF (the core alone, without LIGGGHTS and MPI).
@@ -9,9 +11,24 @@ set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 build=${SOLIDCULL_BUILD:-$root/build}
 log=$build/prepare.log
+cmake_words=(${SOLIDCULL_CMAKE:-})
+targets=()
+for word in "$@"; do
+  if [[ $word == -D* ]]; then cmake_words+=("$word"); else targets+=("$word"); fi
+done
+
+# of those words, or of a build that was configured before
+engine_library() {
+  printf '%s\n' "${cmake_words[@]}" | sed -n 's/^-DLIGGGHTS_LIBRARY\(:[A-Z]*\)\{0,1\}=//p' | grep . | tail -n 1 ||
+    sed -n 's/^LIGGGHTS_LIBRARY:[A-Z]*=//p' "$build/CMakeCache.txt" 2>/dev/null || true
+}
 packages=(cmake make g++ libopenvdb-dev libtbb-dev libboost-dev libeigen3-dev libgtest-dev zlib1g-dev ${SOLIDCULL_PACKAGES:-})
 if [ "${SOLIDCULL_ENGINE:=ON}" = ON ]; then
-  packages+=(liggghts libliggghts-dev libopenmpi-dev openmpi-bin python3 python3-numpy python3-matplotlib)
+  packages+=(python3 python3-numpy python3-matplotlib)
+  case $(engine_library) in
+    '' | *-NOTFOUND | /usr/lib/*/libliggghts.so) packages+=(liggghts libliggghts-dev libopenmpi-dev openmpi-bin) ;;
+    *) command -v mpicxx >/dev/null || packages+=(libopenmpi-dev openmpi-bin) ;;
+  esac
 fi
 gib_per_job=2  # a file that includes OpenVDB takes about 1.5
 
@@ -45,8 +62,13 @@ jobs=$((free_gib / gib_per_job))
 [ "$jobs" -gt "$cores" ] && jobs=$cores
 [ "$jobs" -lt 1 ] && jobs=1
 
-[ "${1:-}" = --configure ] || echo "prepare: building (${*:-everything})"
-cmake -S "$root" -B "$build" -DCMAKE_BUILD_TYPE=Release "-DSOLIDCULL_ENGINE=$SOLIDCULL_ENGINE" ${SOLIDCULL_CMAKE:-} >>"$log" 2>&1 ||
+[ "${targets[0]:-}" = --configure ] || echo "prepare: building (${targets[*]:-everything})"
+if ! cmake -S "$root" -B "$build" -DCMAKE_BUILD_TYPE=Release "-DSOLIDCULL_ENGINE=$SOLIDCULL_ENGINE" "${cmake_words[@]}" \
+  >>"$log" 2>&1; then
+  refusal=$(sed -n 's/^ *solidcull: //p' "$log" | tail -n 1)
+  [ -z "$refusal" ] || { echo "prepare: $refusal" >&2; exit 1; }
   fail "cmake could not configure; see above and $log"
-[ "${1:-}" != --configure ] || exit 0
-cmake --build "$build" -j "${SOLIDCULL_JOBS:-$jobs}" ${*:+--target "$@"} >>"$log" 2>&1 || fail "the build failed; see above and $log"
+fi
+[ "${targets[0]:-}" != --configure ] || exit 0
+cmake --build "$build" -j "${SOLIDCULL_JOBS:-$jobs}" ${targets[*]:+--target "${targets[@]}"} >>"$log" 2>&1 ||
+  fail "the build failed; see above and $log"

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "interposed.h"
+
 namespace LAMMPS_NS {
 class Atom;
 class Fix;
@@ -22,12 +24,12 @@ namespace solidcull::engine {
 
 using FixCreator = LAMMPS_NS::Fix* (*)(LAMMPS_NS::LAMMPS*, int, char**);
 
-/// The engine's own function behind one that this library interposes, by its mangled name; ends the program with one line where
-/// there is none.
+/// The engine's own function behind one that this library interposes; ends the program with one line where there is none.
 void* next_symbol(const char* mangled);
-template <class Function>
-Function own(const char* mangled) {
-  return reinterpret_cast<Function>(next_symbol(mangled));
+template <Call call, class Function>
+Function own() {
+  constexpr const char* symbol = symbol_of(call);
+  return reinterpret_cast<Function>(next_symbol(symbol));
 }
 
 /// The engine's table of fix styles.

@@ -11,6 +11,7 @@
 #include "comm.h"
 #include "error.h"
 #include "input_error.h"
+#include "interpositions.h"
 #include "settings.h"
 #include "update.h"
 
@@ -27,6 +28,7 @@ FixSolidCull::FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
       memory_(lmp, atoms_, contacts_),
       rules_(lmp, this) {
   try {
+    if (!engine::why_not_live().empty()) throw InputError(engine::why_not_live());
     const Settings settings = parse_settings(std::vector<std::string>(arg + 3, arg + narg));
     rules_.refuse_what_was_set_up_wrongly();
     if (!atoms_.make_interface_group())

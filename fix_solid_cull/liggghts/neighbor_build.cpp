@@ -31,12 +31,14 @@ bool culls(const Modify& modify) {
 
 namespace LAMMPS_NS {
 
+using solidcull::engine::Call;
+using solidcull::engine::own;
+
 // interposed as those in register_styles.cpp; a member, for the engine's bins and histories are its own
 void Neighbor::granular_bin_no_newton(NeighList* list) {
   if (exclude || includegroup || triclinic || !culls(*modify)) {
     using Original = void (*)(Neighbor*, NeighList*);
-    static const auto original =
-        solidcull::engine::own<Original>("_ZN9LAMMPS_NS8Neighbor22granular_bin_no_newtonEPNS_9NeighListE");
+    static const auto original = own<Call::neighbor_build, Original>();
     original(this, list);
     return;
   }

@@ -1,6 +1,6 @@
 // Makes the two styles known to an unmodified LIGGGHTS. Fix styles stand in a table; region styles in an if-chain, so the
-// engine's own Domain::add_region is interposed: this library comes before libliggghts.so in the search for symbols, and asks for
-// the next. So is the call by which a wall tells its mesh of a contact: loads of granules that are put away must be known.
+// engine's own Domain::add_region is interposed (interposed.h). So is the call by which a wall tells its mesh of a contact: loads
+// of granules that are put away must be known.
 #include <cstring>
 #include <string>
 
@@ -44,9 +44,12 @@ void add_interface_mesh(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg) {
 
 namespace LAMMPS_NS {
 
+using solidcull::engine::Call;
+using solidcull::engine::own;
+
 void Modify::add_fix(int narg, char** arg, char* suffix) {
   using Original = void (*)(Modify*, int, char**, char*);
-  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Modify7add_fixEiPPcS1_");
+  static const auto original = own<Call::add_fix, Original>();
   solidcull::engine::fix_styles(*this)["solid/cull"] = make_fix;
   if (narg > 2) solidcull::WallContacts::fix_was_made(arg[2]);
   original(this, narg, arg, suffix);
@@ -56,7 +59,7 @@ void Modify::add_fix(int narg, char** arg, char* suffix) {
 /// Before anything of a run is set up.
 void Modify::init() {
   using Original = void (*)(Modify*);
-  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Modify4initEv");
+  static const auto original = own<Call::begin_run, Original>();
   const std::string lost = solidcull::state_that_no_fix_has(*this);
   if (!lost.empty()) error->all(FLERR, lost.c_str());
   constexpr int between_runs = 0;
@@ -67,7 +70,7 @@ void Modify::init() {
 /// delete_atoms asks whether there are contact histories, to take them from the neighbour lists.
 int Modify::n_fixes_style_strict(const char* style) {
   using Original = int (*)(Modify*, const char*);
-  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Modify20n_fixes_style_strictEPKc");
+  static const auto original = own<Call::count_fixes, Original>();
   if (std::strcmp(style, "contacthistory") == 0 && solidcull::leaves_histories()) return 0;
   return original(this, style);
 }
@@ -75,7 +78,7 @@ int Modify::n_fixes_style_strict(const char* style) {
 /// Each command of a deck, however it comes.
 int Input::execute_command() {
   using Original = int (*)(Input*);
-  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS5Input15execute_commandEv");
+  static const auto original = own<Call::deck_command, Original>();
   const solidcull::MetCommand met(lmp, command, command_map->count(command) > 0, arg, narg);
   return original(this);
 }
@@ -83,14 +86,14 @@ int Input::execute_command() {
 /// Formulas are evaluated between runs too, where a command names a variable.
 double Variable::evaluate(char* str, Tree** tree) {
   using Original = double (*)(Variable*, char*, Tree**);
-  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS8Variable8evaluateEPcPPNS0_4TreeE");
+  static const auto original = own<Call::formula, Original>();
   solidcull::met_formula(lmp, str);
   return original(this, str, tree);
 }
 
 void Domain::add_region(int narg, char** arg) {
   using Original = void (*)(Domain*, int, char**);
-  static const auto original = solidcull::engine::own<Original>("_ZN9LAMMPS_NS6Domain10add_regionEiPPc");
+  static const auto original = own<Call::add_region, Original>();
   if (narg >= 2 && std::strcmp(arg[1], "interface/mesh") == 0)
     add_interface_mesh(lmp, narg, arg);
   else
@@ -99,8 +102,7 @@ void Domain::add_region(int narg, char** arg) {
 
 void FixMeshSurface::add_particle_contribution(int ip, double* frc, double* delta, int iTri, double* v_wall) {
   using Original = void (*)(FixMeshSurface*, int, double*, double*, int, double*);
-  static const auto original =
-      solidcull::engine::own<Original>("_ZN9LAMMPS_NS14FixMeshSurface25add_particle_contributionEiPdS1_iS1_");
+  static const auto original = own<Call::mesh_contact, Original>();
   solidcull::MeshLoads::contact(this, ip, frc, delta, iTri);
   original(this, ip, frc, delta, iTri, v_wall);
 }
@@ -112,10 +114,6 @@ extern "C" {
 void solidcull_register(void* lammps) {
   auto* lmp = static_cast<LAMMPS_NS::LAMMPS*>(lammps);
   solidcull::engine::fix_styles(*lmp->modify)["solid/cull"] = make_fix;
-}
-
-void solidcull_region(void* lammps, int words, char** word) {
-  add_interface_mesh(static_cast<LAMMPS_NS::LAMMPS*>(lammps), words, word);
 }
 
 const char* solidcull_version(void) { return SOLIDCULL_VERSION; }
