@@ -17,12 +17,13 @@ import unittest
 from pathlib import Path
 from typing import NamedTuple
 
-from test_messages import BLOCK, HERTZ, MATERIAL, Case, Run
+from test_messages import BLOCK, HERTZ, MATERIAL, Case, Run, deck
 from test_styles import computes_in_code, fixes_in_code, named, styles_of_liggghts
 
 DIAMETER = 0.003
+STEPS = 400
 MARGIN = 0.05  # diameters, from stock's place. The blow moves the ball by 2 and its neighbours by 0.1 diameters
-CLOSE = 0.02   # of the largest value of the run
+CLOSE = 0.05   # of the largest value of the run
 CULL = "fix cull all solid/cull every 10 calm 1 tolerance 3 0 exterior sleep speed 0.05"
 SETTLE = """\
 fix damping all viscous 0.02
@@ -37,8 +38,8 @@ set group ball diameter 0.005 density 4000
 velocity ball set 0 0 -1
 """
 REGIONS = """\
-region left block INF 0.0105 INF INF INF INF units box
-region right block 0.0105 INF INF INF INF INF units box
+region left block INF 0.012 INF INF INF INF units box
+region right block 0.012 INF INF INF INF INF units box
 group left region left
 group right subtract all left
 """
@@ -94,10 +95,11 @@ class Row(NamedTuple):
     lines: str               # what uses the style; {place}: a folder with meshes
     value: str = ""          # an equal-style variable, printed each 50 steps
     whole: str = ""          # what the page names for the whole bed
+    later: str = ""          # lines after a first run of 100 steps, in which all but the ball is culled
     of_ball: bool = False    # the value is of the ball, an atom at all times
     group: str = "left"      # what must not be culled, where the style holds its group
     stored: int = 25         # interior granules that there must be at some step
-    style: str = "granular"  # of atoms
+    style: str = "granular"  # of atoms; or a contact model
     granules: int = 344
 
 
@@ -117,6 +119,8 @@ FIXES = {
     "mesh/surface": Row(AS_MESH),
     "mesh/surface/planar": Row(AS_MESH.replace("mesh/surface", "mesh/surface/planar")),
     "move/mesh": Row(AS_MESH + "fix x all move/mesh mesh m linear 0 0 -0.02"),
+    "move/mesh/file": Row(AS_MESH + "fix x all move/mesh/file mesh m linear 0 0 -0.02"),
+    "move/mesh/gran": Row(AS_MESH + "fix x all move/mesh/gran mesh m linear 0 0 -0.02"),
     "neighlist/mesh": Row(AS_MESH),
     "particledistribution/discrete": Row(INSERTED),
     "particledistribution/discrete/massbased": Row(INSERTED.replace("discrete", "discrete/massbased")),
@@ -135,8 +139,8 @@ FIXES = {
     # they move granules
     "nve/sphere": Row("", "vcm(ball,z)"),
     # they measure atoms only
-    "ave/euler": Row("fix x all ave/euler nevery 50 cell_size_relative 4.5 parallel no", "f_x[1][4]"),
-    "ave/euler/stress": Row("fix x all ave/euler/stress nevery 50 cell_size_relative 4.5 parallel no", "f_x[1][4]"),
+    "ave/euler": Row("fix x all ave/euler nevery 50 cell_size_relative 4.5 parallel no"),
+    "ave/euler/stress": Row("fix x all ave/euler/stress nevery 50 cell_size_relative 4.5 parallel no"),
     "ave/histo": Row("fix x all ave/histo 50 1 50 0 0.1 1 z mode vector", "f_x[1]", "f_x[1]+f_cull[3]"),
     "ave/spatial": Row("fix x all ave/spatial 50 1 50 z lower 0.1 density/number units box", "f_x[1][2]", "f_x[1][2]+f_cull[3]"),
     "check/timestep/gran": Row("fix x all check/timestep/gran 50 0.9 0.9 warn no", "f_x[1]"),
@@ -146,7 +150,7 @@ FIXES = {
     "store/force": Row("fix x all store/force\ncompute sum ball reduce sum f_x[3]", "c_sum", of_ball=True),
     # they hold their group
     "aveforce": Row("fix x left aveforce NULL NULL -1e-4"),
-    "enforce2d": Row("fix x left enforce2d", style="2d", granules=49),
+    "enforce2d": Row("fix x left enforce2d", style="2d", granules=49, stored=4),
     "freeze": Row("fix x left freeze"),
     "lineforce": Row("fix x left lineforce 0 0 1"),
     "move": Row(RIGHT_ALONE + "fix x left move linear 0 0 0.1"),
@@ -160,7 +164,7 @@ FIXES = {
     "drag": Row("fix x left drag 0.01 0.01 0.05 1e-4 0.01"),
     "efield": Row("set group all charge 1\nfix x left efield 1e-4 0 0", style="hybrid granular charge"),
     "external": Row("fix x left external pf/array 1"),
-    "fiber/spring/simple": Row("fix x left fiber/spring/simple tether 0.01 0.01 0.05 0.1 0.01"),
+    "fiber/spring/simple": Row("fix v all property/global characteristicVelocity scalar 2\nfix x left fiber/spring/simple tether 0.01 0.01 0.05 0.1 0.01"),
     "massflow/mesh/sieve": Row(AS_MESH.replace("planar", "") + "fix x left massflow/mesh/sieve mesh m count once vec_side 0 0 -1 sieveSize 0.001 sieveSpacing 0.001 sieveStiffness 100 sieveDamping 0.1"),
     "momentum": Row("fix x left momentum 10 linear 1 1 1"),
     "nve": Row(RIGHT_ALONE + "fix x left nve"),
@@ -194,9 +198,9 @@ COMPUTES = {
     "centro/atom": Row("compute a all centro/atom 6\ncompute x ball reduce sum c_a", "c_x", of_ball=True),
     "cna/atom": Row("compute a all cna/atom 0.004\ncompute x ball reduce sum c_a", "c_x", of_ball=True),
     "contact/atom": Row("compute a all contact/atom\ncompute x ball reduce sum c_a", "c_x", of_ball=True),
-    "contact/atom/gran": Row("compute a all contact/atom/gran\ncompute x ball reduce sum c_a", "c_x", of_ball=True),
-    "coord/atom": Row("compute a all coord/atom 0.0045\ncompute x ball reduce sum c_a", "c_x", of_ball=True),
-    "pair/gran/local": Row("compute a all pair/gran/local delta\ncompute x all reduce sum c_a", "c_x"),
+    "contact/atom/gran": Row("compute a all contact/atom/gran\ncompute x all reduce sum c_a", "c_x"),
+    "coord/atom": Row("compute a all coord/atom 0.0045\ncompute x all reduce sum c_a", "c_x"),
+    "pair/gran/local": Row("compute a all pair/gran/local delta force\ncompute x all reduce max c_a[4]", "c_x"),
     "stress/atom": Row("compute a all stress/atom\ncompute x ball reduce sum c_a[3]", "c_x", of_ball=True),
     "wall/gran/local": Row(AS_MESH + "compute a all wall/gran/local force\ncompute x all reduce sum c_a[3]", "c_x"),
     # of the group as a whole
@@ -207,17 +211,47 @@ COMPUTES = {
     "gyration": Row("compute x left gyration", "c_x"),
     "gyration/molecule": Row("compute x left gyration/molecule", "c_x[1]", style="hybrid granular molecular"),
     "inertia/molecule": Row("compute x left inertia/molecule", "c_x[1][1]", style="hybrid granular molecular"),
-    "msd": Row("compute x left msd", "c_x[4]"),
-    "msd/molecule": Row("compute x left msd/molecule", "c_x[1][4]", style="hybrid granular molecular"),
+    "msd": Row("compute x left msd", "sqrt(c_x[4])"),
+    "msd/molecule": Row("compute x left msd/molecule", "sqrt(c_x[1][4])", style="hybrid granular molecular"),
     "nparticles/tracer/region": Row("fix tr left property/atom/tracer region_mark left mark_step 2050 check_mark_every 10\n"
                                     "compute x left nparticles/tracer/region region_count left tracer tr", "c_x[1]"),
     "pressure": Row("compute t all temp\ncompute x all pressure t", "c_x", group="all", stored=-1),
     "property/molecule": Row("compute x left property/molecule count", "c_x[1]", style="hybrid granular molecular"),
     "rdf": Row("compute x left rdf 10", "c_x[1][2]"),
-    "temp": Row("compute x left temp", "c_x"),
+    "temp": Row("compute x left temp", "sqrt(c_x)"),
 }
 
 
+# of pair_style gran: each with the same history, and the few steps that its stiffness allows
+MODELS = ["model hooke", "model hertz", "model hooke/stiffness tangential history", "model hertz/stiffness tangential history",
+          "model hooke/hysteresis tangential history", "model luding tangential history", "model luding tangential tan_luding",
+          "model luding tangential tan_luding rolling_friction luding", "model thornton_ning tangential history",
+          "model edinburgh tangential history", "model edinburgh/stiffness tangential history", "model hertz tangential no_history",
+          "model hertz tangential history cohesion sjkr", "model hertz tangential history cohesion sjkr2",
+          *(f"model hertz tangential history rolling_friction {r} surface default" for r in ("cdt", "epsd", "epsd2", "epsd3"))]
+STIFF = ("thornton_ning", "model edinburgh tangential")  # they fly apart in stock with a step of 2e-5 s
+REFUSED_MODELS = {"easo/capillary/viscous", "washino/capillary/viscous", "multicontact", "superquadric"}
+CONSTANTS = {"coefficientRollingFriction": 0.1, "coefficientRollingViscousDamping": 0.1, "cohesionEnergyDensity": 1000, "kn": 2e3,
+             "kt": 1e3, "gamman": 2e4, "gammat": 1e4, "coefficientMaxElasticStiffness": 2, "coefficientAdhesionStiffness": 0.01,
+             "coefficientPlasticityDepth": 0.1, "coefficientRestitutionLog": -1.2, "UnloadingStiffness": 5, "LoadingStiffness": 2e3,
+             "pullOffForce": 0, "surfaceEnergy": 0.1, "FrictionViscosity": 0.1, "FluidViscosity": 0.1, "coeffFrictionStiffness": 0.5,
+             "coeffRollingStiffness": 0.5}
+SCALARS = {"rollingStiffness": 1, "overlapExponent": 1.5, "adhesionExponent": 1.5, "characteristicVelocity": 1}
+OF_MODELS = "".join([f"fix p{k} all property/global {c} peratomtypepair 1 {x}\n" for k, (c, x) in enumerate(CONSTANTS.items())] +
+                    [f"fix s{k} all property/global {c} scalar {x}\n" for k, (c, x) in enumerate(SCALARS.items())] +
+                    ["fix yield all property/global coefficientYieldRatio peratomtype 0.5\n"])
+LATER = ["fix x left addforce 5e-4 0 0", "fix x left setforce 0 0 NULL", "compute x left com",
+         "unfix grav\nfix grav right gravity 9.81 vector 0 0 -1",
+         "unfix integrate\nfix integrate right nve/sphere\nfix x left nve/noforce"]
+LIQUID = "".join(f"fix l{k} all property/global {c} scalar {x}\n" for k, (c, x) in enumerate({
+    "surfaceLiquidContentInitial": 1, "surfaceTension": 0.05, "fluidViscosity": 0.001, "minSeparationDistanceRatio": 1.01,
+    "maxSeparationDistanceRatio": 1.1, "maxLiquidContent": 10, "lbVolumeFraction": 0.05}.items())) + \
+    "fix angle all property/global contactAngle peratomtype 0.5\n"
+REFUSED = {  # lines of a deck, and what solid/cull says
+    "compute x all erotate/multisphere": "compute x (erotate/multisphere): multisphere clumps are not supported yet",
+    "compute x all ke/multisphere": "compute x (ke/multisphere): multisphere clumps are not supported yet",
+    "compute x all group/group all pair no": "compute x (group/group): LIGGGHTS's granular contacts do not support it",
+}
 
 
 class Told(NamedTuple):
@@ -263,6 +297,10 @@ class Decks(Case):
     def bed(self, row):
         if row.style == "2d":
             return FLAT
+        if row.style in MODELS:
+            short = SETTLE.replace("run 1500", "run 300").replace("run 500\n", "") + REGIONS
+            bed = (BLOCK + short).replace(MATERIAL, MATERIAL + OF_MODELS).replace("model hertz tangential history", row.style)
+            return bed.replace("timestep 2e-5", "timestep 1e-6") if any(s in row.style for s in STIFF) else bed
         if row.style != "granular":
             return BLOCK.replace("atom_style granular", "atom_style " + row.style) + SETTLE + REGIONS
         head = BLOCK[:BLOCK.index("region box")] + f"read_restart {self.place}/bed.restart\nneighbor 0.0004 bin\nneigh_modify delay 0\n"
@@ -276,13 +314,15 @@ class Decks(Case):
         if culled:
             columns += [CULL, "variable whole equal " + (row.whole or "0"), f"compute state {row.group} reduce max f_cull"]
             printed += ["v_whole", "f_cull[3]", "c_state"]
+        if row.later:
+            columns += ["run 100", row.later]
         end = self.place / "end"
         run = self.accepted("\n".join([
             self.bed(row) + row.lines.replace("{place}", str(self.place)), *columns, "thermo 50",
-            "thermo_style custom step " + " ".join(printed), "thermo_modify format float %.12g lost error norm no", "run 600",
+            "thermo_style custom step " + " ".join(printed), "thermo_modify format float %.12g lost error norm no", f"run {STEPS}",
             *(["unfix cull"] if culled else []), f"write_dump all custom {end} id x y z\n"]))
-        told = [Told(*map(float, line.split())) for line in run.thermo()][-13:]
-        self.assertEqual(len(told), 13)
+        told = [Told(*map(float, line.split())) for line in run.thermo()][-STEPS // 50 - 1:]
+        self.assertEqual(len(told), STEPS // 50 + 1)
         places = {int(r[0]): list(map(float, r[1:])) for r in map(str.split, end.read_text().splitlines()[9:])}
         return told, places, run.log
 
@@ -331,6 +371,40 @@ class Decks(Case):
                 self.assertEqual({t.body for t in culled}, {0}, "a granule of the group was culled")
                 if style not in fixes_in_code() or treatment(fixes_in_code(), style) == "drives":
                     self.assertRegex(log, f"(?m)^fix cull solid/cull: .*\\({re.escape(style)}\\) .*: granules of its group are not culled")
+
+    def test_what_comes_between_two_runs(self):
+        for later in LATER:
+            with self.subTest(later):
+                _, culled, _ = self.ends_alike(Row("", later=later, stored=20))
+                self.assertEqual({t.body for t in culled}, {0}, "a granule of the group is still culled")
+
+    def test_contact_models(self):
+        for model in MODELS:
+            with self.subTest(model):
+                self.ends_alike(Row("", style=model, stored=20))
+
+    def test_refused_computes(self):
+        for line, told in REFUSED.items():
+            with self.subTest(line):
+                self.refused_by_fix(deck(line, "fix cull all solid/cull", "run 0"), told + "; leave the compute or the fix out")
+
+    def test_contact_models_with_liquid(self):
+        for model in "easo/capillary/viscous", "washino/capillary/viscous":
+            with self.subTest(model):
+                text = deck("fix cull all solid/cull", "run 0", pair=f"{HERTZ} cohesion {model}").replace(MATERIAL, MATERIAL + LIQUID)
+                self.refused_by_fix(text, f"the liquid of cohesion model {model} would be lost with the culled granules: use sjkr or sjkr2")
+
+    def test_pair_styles_that_are_not_gran(self):
+        for style in "gran_bubble", "bubble":
+            with self.subTest(style):
+                self.refused_by_fix(deck("fix cull all solid/cull", "run 0", pair=HERTZ.replace("gran", style)),
+                                    f"pair_style '{style}' is not granular: use pair_style gran")
+
+    def test_every_contact_model_has_a_deck_or_is_refused(self):
+        for kind in "Normal", "Tangential", "Cohesion", "Rolling", "Surface":
+            for model in styles_of_liggghts(f"{kind} models for pair gran:"):
+                with self.subTest(model):
+                    self.assertTrue(model in REFUSED_MODELS or any(model in words.split() for words in MODELS))
 
     def test_every_style_that_is_not_refused_has_a_deck(self):
         for kind, table, code in ("Fix styles", FIXES, fixes_in_code()), ("Compute styles:", COMPUTES, computes_in_code()):

@@ -76,7 +76,11 @@ void DeckRules::refuse_what_cannot_be_culled() const {
     refuse("run_style '" + std::string(update->integrate_style) + "' is not supported: use run_style verlet");
   if (!force->pair || std::strcmp(force->pair_style, "gran") != 0)
     refuse("pair_style '" + std::string(force->pair_style) + "' is not granular: use pair_style gran");
-  if (static_cast<const LAMMPS_NS::PairGran*>(force->pair)->storeContactForces())
+  auto* const pair = static_cast<LAMMPS_NS::PairGran*>(force->pair);
+  for (const char* model : {"easo/capillary/viscous", "washino/capillary/viscous"})
+    if (pair->contact_match("cohesion", model))
+      refuse("the liquid of cohesion model " + std::string(model) + " would be lost with the culled granules: use sjkr or sjkr2");
+  if (pair->storeContactForces())
     refuse("contact forces are stored per contact (store_force_contact): those of culled granules would be missing");
   refuse_physics_that_would_miss_granules();
   refuse_measures_of_other_physics();
