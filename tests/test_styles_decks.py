@@ -102,6 +102,7 @@ class Row(NamedTuple):
     style: str = "granular"  # of atoms; or a contact model
     granules: int = 344      # in the end
     lost: str = "error"      # of thermo_modify
+    ranks: int = 1
 
 
 FIXES = {
@@ -241,6 +242,15 @@ SCALARS = {"rollingStiffness": 1, "overlapExponent": 1.5, "adhesionExponent": 1.
 OF_MODELS = "".join([f"fix p{k} all property/global {c} peratomtypepair 1 {x}\n" for k, (c, x) in enumerate(CONSTANTS.items())] +
                     [f"fix s{k} all property/global {c} scalar {x}\n" for k, (c, x) in enumerate(SCALARS.items())] +
                     ["fix yield all property/global coefficientYieldRatio peratomtype 0.5\n"])
+# what the page names for the whole bed, besides computes and fixes: a value of stock, and with the line
+WHOLE_BED = {
+    "count(all)": "f_cull[1]+f_cull[2]+f_cull[3]",
+    "mass(all)": "f_cull[23]",
+    "xcm(all,x)": "f_cull[24]",
+    "xcm(all,y)": "f_cull[25]",
+    "xcm(all,z)": "f_cull[26]",
+    "vcm(all,z)*mass(all)": "vcm(all,z)*mass(all)+f_cull[15]",
+}
 LATER = ["fix x left addforce 5e-4 0 0", "fix x left setforce 0 0 NULL", "compute x left com",
          "unfix grav\nfix grav right gravity 9.81 vector 0 0 -1",
          "unfix integrate\nfix integrate right nve/sphere\nfix x left nve/noforce"]
@@ -321,7 +331,7 @@ class Decks(Case):
         run = self.accepted("\n".join([
             self.bed(row) + row.lines.replace("{place}", str(self.place)), *columns, "thermo 50",
             "thermo_style custom step " + " ".join(printed), f"thermo_modify format float %.12g lost {row.lost} norm no", f"run {STEPS}",
-            *(["unfix cull"] if culled else []), f"write_dump all custom {end} id x y z\n"]))
+            *(["unfix cull"] if culled else []), f"write_dump all custom {end} id x y z\n"]), ranks=row.ranks)
         told = [Told(*map(float, line.split())) for line in run.thermo()][-STEPS // 50 - 1:]
         self.assertEqual(len(told), STEPS // 50 + 1)
         places = {int(r[0]): list(map(float, r[1:])) for r in map(str.split, end.read_text().splitlines()[9:])}
@@ -372,6 +382,32 @@ class Decks(Case):
                 self.assertEqual({t.body for t in culled}, {0}, "a granule of the group was culled")
                 if style not in fixes_in_code() or treatment(fixes_in_code(), style) == "drives":
                     self.assertRegex(log, f"(?m)^fix cull solid/cull: .*\\({re.escape(style)}\\) .*: granules of its group are not culled")
+
+    def test_values_for_the_whole_bed(self):
+        for value, whole in WHOLE_BED.items():
+            with self.subTest(value):
+                stock, culled, _ = self.ends_alike(Row("", value, whole))
+                self.same(stock, [t.whole for t in culled])
+
+    def test_on_two_ranks(self):
+        for row in (Row("", "xcm(all,z)", "f_cull[26]", ranks=2), Row("compute x all ke", "c_x", "f_cull[27]", ranks=2),
+                    FIXES["massflow/mesh"]._replace(whole="f_x[2]", ranks=2),
+                    Row("variable v equal vcm(left,x)", "v_v", "v_v", later=LATER[0], stored=20, ranks=2)):
+            with self.subTest(row.value):
+                stock, culled, _ = self.ends_alike(row)
+                self.same(stock, [t.whole for t in culled])
+
+    def test_dumps_have_the_atoms_and_bed_files_have_all(self):
+        run = Run(self.bed(Row("")) + f"{CULL} bed 50 {self.place}/all.*.vtp\ndump d all custom 50 {self.place}/d.* id f_cull\nthermo 50\n"
+                  "thermo_style custom step atoms f_cull[1] f_cull[2] f_cull[3]\nthermo_modify lost error norm no\nrun 400\n")
+        self.assertEqual(run.status, 0)
+        told = [line.split() for line in run.thermo()]
+        self.assertEqual(len(told), 9)
+        for step, _, exterior, shell, interior in told[1:]:
+            columns = [line.split() for line in (self.place / f"d.{step}").read_text().splitlines()[9:]]
+            self.assertEqual(sum(float(body) == 0 for _, body in columns), float(exterior))
+            self.assertEqual(sum(float(body) > 0 for _, body in columns), float(shell))
+            self.assertIn('NumberOfPoints="344"', (self.place / f"all.{step}.vtp").read_bytes().decode("latin-1"))
 
     def test_what_comes_between_two_runs(self):
         for later in LATER:
