@@ -1,5 +1,5 @@
-"""Each fix and compute style of LIGGGHTS has its treatment beside solid/cull, and the page of styles says the same as the code; it
-names each style of every other kind too."""
+"""Each fix and compute style of LIGGGHTS has its treatment beside solid/cull, and the page of styles says the same as the
+code. The page names each style of every other kind too."""
 import re
 import shutil
 import subprocess

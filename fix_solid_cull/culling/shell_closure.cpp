@@ -234,8 +234,7 @@ std::size_t ShellClosure::fetch_what_is_near(bool open_for_insertion) {
   find_near_granules(near);
   find_near_walls(near);
   const auto open = [&](const std::vector<Box>& boxes) {
-    for (const Box& box : boxes)
-      stored_.for_each_in_box(box.lo, box.hi, [&](const Resident& g) { near.insert(g.tag); });
+    for (const Box& box : boxes) stored_.for_each_in_box(box.lo, box.hi, [&](const Resident& g) { near.insert(g.tag); });
   };
   const double margin = solid_.store().largest_radius() + ports_.run.skin;
   if (open_for_insertion) open(ports_.insertions.boxes(false, margin));

@@ -146,7 +146,8 @@ void DeckRules::say_what_sees_atoms_only(const Run& run) {
   for (int f = 0; f < modify->nfix; ++f)
     if (treatment_of(modify->fix[f]->style).treatment == Treatment::atoms_only) of_atoms.add(named(modify->fix[f]));
   if (!of_atoms.empty()) say_once(run, "interior granules are missing in what these measure: " + of_atoms.text());
-  if (!of_contacts.empty()) say_once(run, "contacts inside solid bodies are missing in what these measure: " + of_contacts.text());
+  if (!of_contacts.empty())
+    say_once(run, "contacts inside solid bodies are missing in what these measure: " + of_contacts.text());
 }
 
 void DeckRules::say_once(const Run& run, const std::string& line) {
