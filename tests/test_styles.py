@@ -1,4 +1,5 @@
-"""Each fix style of LIGGGHTS has its treatment beside solid/cull, and the command page says the same as the code."""
+"""Each fix and compute style of LIGGGHTS has its treatment beside solid/cull, and the page of styles says the same as the
+code. The page names each style of every other kind too."""
 import re
 import shutil
 import subprocess
@@ -6,46 +7,76 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-CODE = ROOT / "fix_solid_cull" / "liggghts" / "fix_styles.cpp"
-PAGE = ROOT / "fix_solid_cull" / "fix_solid_cull.md"
+CODE = ROOT / "fix_solid_cull" / "liggghts"
+PAGE = ROOT / "fix_solid_cull" / "other_styles.md"
 HELPERS = {"MINIMIZE", "READ_RESTART", "RESPA", "STORE"}  # LIGGGHTS's own: no line of a deck names them
-ROWS = {"exact": "exact", "integrates": "move granules", "atoms_only": "measure", "holds": "hold", "drives": "act on each",
-        "refused": "refused"}
+# rows of the page's tables begin with these words; in the code they are called so
+FIX_ROWS = {"exact": "exact", "move granules": "integrates", "measure": "atoms_only", "hold": "holds", "act on each": "drives",
+            "refused": "refused"}
+COMPUTE_ROWS = {"exact": "exact", "see atoms only": "atoms_only", "miss contacts": "contacts", "hold": "whole", "refused": "refused"}
+# kinds of `liggghts -h` that the code has no table of, and the page's heading
+OTHER_KINDS = {"Atom styles:": "Atom styles", "Integrate styles:": "Integrate styles", "Pair styles:": "Pair styles",
+               "Normal models for pair gran:": "Pair styles", "Tangential models for pair gran:": "Pair styles",
+               "Cohesion models for pair gran:": "Pair styles", "Rolling models for pair gran:": "Pair styles",
+               "Surface models for pair gran:": "Pair styles", "Region styles:": "Region styles", "Dump styles:": "Dump styles"}
 
 
-def in_code():
-    return dict(re.findall(r'{"([^"]+)", (\w+), ', CODE.read_text()))
+def table_in(file):
+    return dict(re.findall(r'{"([^"]+)", (\w+), ', (CODE / file).read_text()))
 
 
-def in_page():
-    text = PAGE.read_text().split("### Other fixes")[1].split("###")[0]
+def fixes_in_code():
+    return table_in("fix_styles.cpp")
+
+
+def computes_in_code():
+    return table_in("compute_styles.cpp")
+
+
+def section(heading):
+    return PAGE.read_text().split(f"## {heading}\n")[1].split("\n## ")[0]
+
+
+def in_page(heading, rows):
     treatments = {}
-    for row in re.findall(r"^\| (?!beside|---)([^|]+) \| ([^|]+) \|$", text, re.M):
-        (treatment,) = [t for t, begin in ROWS.items() if row[0].startswith(begin)]
+    first = section(heading).split("| beside")[1].split("\n\n")[0]
+    for row in re.findall(r"^\| (?!---)([^|]+) \| ([^|]+) \|$", first.split("\n", 1)[1], re.M):
+        (treatment,) = [t for begin, t in rows.items() if row[0].startswith(begin)]
         treatments.update({name: treatment for name in re.findall(r"`([^`]+)`", row[1])})
     return treatments
 
 
-def styles_of_liggghts():
+def styles_of_liggghts(kind):
+    """As `liggghts -h` lists them, between two lines with a star."""
     told = subprocess.run(["liggghts", "-h"], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False).stdout
-    return set(told.split("* Fix styles")[1].split("* Compute styles")[0].split())
+    return set(told.split("* " + kind)[1].split("\n*")[0].split())
 
 
 def named(name, style):
     return style.startswith(name[:-1]) if name.endswith("*") else style == name
 
 
-class FixStyles(unittest.TestCase):
+class Styles(unittest.TestCase):
     def test_the_page_says_what_the_code_does(self):
-        self.assertEqual(in_page(), {name: t for name, t in in_code().items() if name not in HELPERS})
+        self.assertEqual(in_page("Fix styles", FIX_ROWS), {n: t for n, t in fixes_in_code().items() if n not in HELPERS})
+        self.assertEqual(in_page("Compute styles", COMPUTE_ROWS), computes_in_code())
 
     @unittest.skipUnless(shutil.which("liggghts"), "no liggghts")
-    def test_every_style_of_liggghts_is_in_the_table_once(self):
-        styles = styles_of_liggghts()
-        self.assertGreater(len(styles), 90)
-        for style in styles:
-            with self.subTest(style=style):
-                self.assertEqual(len([name for name in in_code() if named(name, style)]), 1)
+    def test_every_style_of_liggghts_is_in_its_table_once(self):
+        for kind, table, least in ("Fix styles", fixes_in_code(), 90), ("Compute styles:", computes_in_code(), 43):
+            styles = styles_of_liggghts(kind)
+            self.assertGreater(len(styles), least)
+            for style in styles:
+                with self.subTest(kind=kind, style=style):
+                    self.assertEqual(len([name for name in table if named(name, style)]), 1)
+
+    @unittest.skipUnless(shutil.which("liggghts"), "no liggghts")
+    def test_the_page_names_every_other_style_of_liggghts(self):
+        for kind, heading in OTHER_KINDS.items():
+            names = re.findall(r"`([^`]+)`", section(heading))
+            for style in styles_of_liggghts(kind):
+                with self.subTest(kind=kind, style=style):
+                    self.assertTrue(any(named(name, style) for name in names))
 
 
 if __name__ == "__main__":

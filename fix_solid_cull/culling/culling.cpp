@@ -389,6 +389,8 @@ void Culling::change() {
     p_.ports.ranks.update();
     p_.handover.forget_homes();
   }
+  // another fix may have deleted granules in this hook
+  if (phase_ == Phase::stepping && p_.lost.forget_lost()) settle_bodies();
   p_.ports.memory.freed(p_.exchange.begin_change());
   MembershipChange c(p_.for_change(), p_.wake.take(p_.ports.ranks), proposal_.take());
   const bool changes = p_.ports.ranks.any(c.any_here() || p_.grounding.lets_go() || open_for_insertion_);

@@ -205,6 +205,8 @@ class Insertions {
   /// Boxes around their regions, `margin` larger on each side; of those due at this step or the next only, if `soon`.
   virtual std::vector<Box> boxes(bool soon, double margin) const = 0;
   virtual bool has_inserted() const = 0;  ///< in this reneighbouring
+  /// Boxes around meshes that count the atoms that pass, `margin` larger on each side: what is in them must be atoms.
+  virtual std::vector<Box> counting(double margin) const = 0;
 };
 
 /// Ranks, and periodic images, which are neighbours too. Rows are plain structs; the same type is named by all ranks.

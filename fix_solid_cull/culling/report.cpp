@@ -6,17 +6,22 @@
 namespace solidcull {
 
 double Report::value(int n) {
-  if (n < 0 || n >= counts + carried) return 0;
+  if (n < 0 || n >= counts + carried + of_all) return 0;
   if (totals_step_ != ports_.run.step || totals_version_ != membership_version_) {
     totals_.clear();
     carried_.clear();
+    all_.clear();
   }
   totals_step_ = ports_.run.step;
   totals_version_ = membership_version_;
   if (totals_.empty()) count_totals();
   if (n < counts) return totals_[n];
-  if (carried_.empty()) sum_carried();
-  return carried_[n - counts];
+  if (n < counts + carried) {
+    if (carried_.empty()) sum_carried();
+    return carried_[n - counts];
+  }
+  if (all_.empty()) sum_all();
+  return all_[n - counts - carried];
 }
 
 void Report::count_totals() {
@@ -62,6 +67,31 @@ void Report::sum_carried() {
               energy,      moment[0],   moment[1],   moment[2],  mass};
   ports_.ranks.sum(carried_.data(), static_cast<int>(carried_.size()));
   for (int d = 7; d < 10; ++d) carried_[d] = carried_[10] > 0 ? carried_[d] / carried_[10] : 0.0;
+}
+
+/// Mass, centre of mass, and kinetic energy of the centres and of the spins, of all granules: places in the box, as atoms have
+/// them.
+void Report::sum_all() {
+  double sums[6] = {};
+  const auto add = [&](double mass, double radius, const Vec3& x, const Vec3& v, const Vec3& spin) {
+    const RigidPart p = RigidPart::granule(mass, radius, x, v, spin);
+    const double of_centre = 0.5 * mass * v.squaredNorm();
+    sums[0] += mass;
+    for (int d = 0; d < 3; ++d) sums[1 + d] += mass * x[d];
+    sums[4] += of_centre;
+    sums[5] += p.kinetic_energy() - of_centre;
+  };
+  const Atoms& atoms = ports_.atoms;
+  for (int i = 0; i < atoms.owned; ++i) add(atoms.mass[i], atoms.radius[i], atoms.place(i), atoms.velocity(i), atoms.spin(i));
+  if (solid_.has_store())
+    solid_.store().for_each([&](const Resident& g) {
+      const Twist& twist = solid_.bodies().body(g.body).twist;
+      const Vec3 x = solid_.in_world(g);
+      add(solid_.store().get(g.tag).mass, g.radius, ports_.run.wrapped(x), twist.at(x), twist.spin);
+    });
+  ports_.ranks.sum(sums, 6);
+  for (int d = 1; d < 4; ++d) sums[d] = sums[0] > 0 ? sums[d] / sums[0] : 0.0;
+  all_.assign(sums, sums + 6);
 }
 
 void Report::tell_run() {

@@ -17,6 +17,7 @@ class Report {
  public:
   static constexpr int counts = 12;   ///< f_ID[1..12]
   static constexpr int carried = 10;  ///< after them: what interior granules carry
+  static constexpr int of_all = 6;    ///< and what all granules have together
   static constexpr int interior = 2;  ///< index of f_ID itself among them
 
   Report(const Ports& ports, const Solid& solid, const Shell& shell, const BodyGroups& groups, const BodyMotion& motion)
@@ -34,6 +35,7 @@ class Report {
  private:
   void count_totals();
   void sum_carried();
+  void sum_all();
 
   const Ports& ports_;
   const Solid& solid_;
@@ -41,7 +43,7 @@ class Report {
   const BodyGroups& groups_;
   const BodyMotion& motion_;
   StopWatch watch_;
-  std::vector<double> totals_, carried_;  // as of:
+  std::vector<double> totals_, carried_, all_;  // as of:
   std::int64_t totals_step_ = -1, totals_version_ = -1;
   std::int64_t membership_version_ = 0;
 };

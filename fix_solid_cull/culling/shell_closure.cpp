@@ -233,9 +233,12 @@ std::size_t ShellClosure::fetch_what_is_near(bool open_for_insertion) {
   std::set<std::int64_t> near;
   find_near_granules(near);
   find_near_walls(near);
-  if (open_for_insertion)
-    for (const Box& box : ports_.insertions.boxes(false, solid_.store().largest_radius() + ports_.run.skin))
-      stored_.for_each_in_box(box.lo, box.hi, [&](const Resident& g) { near.insert(g.tag); });
+  const auto open = [&](const std::vector<Box>& boxes) {
+    for (const Box& box : boxes) stored_.for_each_in_box(box.lo, box.hi, [&](const Resident& g) { near.insert(g.tag); });
+  };
+  const double margin = solid_.store().largest_radius() + ports_.run.skin;
+  if (open_for_insertion) open(ports_.insertions.boxes(false, margin));
+  open(ports_.insertions.counting(margin));
   for (const std::int64_t tag : near) exchange_.bring_back(tag);
   return near.size();
 }
@@ -303,6 +306,8 @@ class ShellClosure::Surroundings {
     if (several) find_others();
     // what is to be inserted at this step or the next must find the bed open
     opened_ = c.ports_.insertions.boxes(true, c.solid_.store().largest_radius() + c.ports_.run.skin);
+    const std::vector<Box> counting = c.ports_.insertions.counting(c.solid_.store().largest_radius() + gap_);
+    opened_.insert(opened_.end(), counting.begin(), counting.end());
   }
   bool near(int i) const {
     return exterior_.any_near(c_.ports_.atoms.sphere(i), gap_) || near_another_body(i) || is_open(c_.ports_.atoms.place(i));

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstring>
-#include <iterator>
+#include <initializer_list>
 
+#include "compute_styles.h"
 #include "fix_styles.h"
+#include "style_table.h"
 
 namespace solidcull {
 namespace {
@@ -97,10 +98,7 @@ constexpr CommandStyle styles[] = {
     {"replicate", all_restored},
 };
 
-bool names(const CommandStyle& entry, const std::string& command) {
-  const std::size_t n = std::strlen(entry.name);
-  return entry.name[n - 1] == '*' ? command.compare(0, n - 1, entry.name, n - 1) == 0 : command == entry.name;
-}
+constexpr CommandStyle not_known = {"", all_restored};
 
 bool is_one_of(const std::string& word, std::initializer_list<const char*> list) {
   return std::find(list.begin(), list.end(), word) != list.end();
@@ -119,7 +117,10 @@ bool fix_reads_granules(const std::string& style) {
   const Treatment t = treatment_of(style).treatment;
   return t == Treatment::drives || t == Treatment::holds || style == "store/state";
 }
-bool compute_reads_granules(const std::string& style) { return style == "msd" || style == "displace/atom"; }
+bool compute_reads_granules(const std::string& style) {
+  const ComputeStyle& known = measure_of(style);
+  return known.measure == Measure::whole || style == "displace/atom" || *known.name == 0;
+}
 
 }  // namespace
 
@@ -127,10 +128,8 @@ Sight sight_of(const std::string& command, const std::vector<std::string>& words
   if (command == "delete_atoms" && renumbers(words)) return all_restored;
   if (command == "fix" && words.size() > 2 && fix_reads_granules(words[2])) return whole_bed;
   if (command == "compute" && words.size() > 2 && compute_reads_granules(words[2])) return whole_bed;
-  const auto* const found =
-      std::find_if(std::begin(styles), std::end(styles), [&](const CommandStyle& s) { return names(s, command); });
-  if (found == std::end(styles)) return engine_has_it ? all_restored : nothing;
-  return found->sight;
+  const CommandStyle& found = row_of(command, styles, not_known);
+  return *found.name == 0 && !engine_has_it ? nothing : found.sight;
 }
 
 bool reads_granules(const std::string& formula) {

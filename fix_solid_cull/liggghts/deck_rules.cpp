@@ -4,6 +4,8 @@
 #include <cstring>
 
 #include "atom.h"
+#include "compute.h"
+#include "compute_styles.h"
 #include "domain.h"
 #include "engine_access.h"
 #include "fix_insert.h"
@@ -21,6 +23,35 @@ namespace {
 constexpr const char* newton_on = "newton is on: put 'newton off' at the top of the deck";
 
 [[noreturn]] void refuse(const std::string& why) { throw InputError(why); }
+
+/// LIGGGHTS makes some itself, for thermo output.
+bool is_of_the_deck(const LAMMPS_NS::Compute* compute) { return std::strncmp(compute->id, "thermo_", 7) != 0; }
+
+std::string named(const LAMMPS_NS::Fix* fix) { return "fix " + std::string(fix->id) + " (" + fix->style + ")"; }
+std::string named(const LAMMPS_NS::Compute* compute) {
+  return "compute " + std::string(compute->id) + " (" + compute->style + ")";
+}
+
+/// f_ID in a line, with the ID that the deck gave.
+std::string with_id(std::string line, const std::string& id) {
+  for (std::size_t at = line.find("f_ID"); at != std::string::npos; at = line.find("f_ID", at)) line.replace(at, 4, "f_" + id);
+  return line;
+}
+
+/// Names, of which a line gives the first few.
+class Names {
+ public:
+  void add(const std::string& name) {
+    if (++count_ <= most) text_ += (count_ > 1 ? ", " : "") + name;
+  }
+  bool empty() const { return count_ == 0; }
+  std::string text() const { return count_ > most ? text_ + " and " + std::to_string(count_ - most) + " more" : text_; }
+
+ private:
+  static constexpr int most = 5;
+  int count_ = 0;
+  std::string text_;
+};
 
 }  // namespace
 
@@ -43,11 +74,24 @@ void DeckRules::refuse_what_cannot_be_culled() const {
   if (update->whichflag == minimizing) refuse("minimize would move atoms only: unfix " + std::string(own_->id) + " first");
   if (std::strstr(update->integrate_style, "verlet") == nullptr)
     refuse("run_style '" + std::string(update->integrate_style) + "' is not supported: use run_style verlet");
-  if (!force->pair || std::strncmp(force->pair_style, "gran", 4) != 0)
+  if (!force->pair || std::strcmp(force->pair_style, "gran") != 0)
     refuse("pair_style '" + std::string(force->pair_style) + "' is not granular: use pair_style gran");
-  if (static_cast<const LAMMPS_NS::PairGran*>(force->pair)->storeContactForces())
+  auto* const pair = static_cast<LAMMPS_NS::PairGran*>(force->pair);
+  for (const char* model : {"easo/capillary/viscous", "washino/capillary/viscous"})
+    if (pair->contact_match("cohesion", model))
+      refuse("the liquid of cohesion model " + std::string(model) + " would be lost with the culled granules: use sjkr or sjkr2");
+  if (pair->storeContactForces())
     refuse("contact forces are stored per contact (store_force_contact): those of culled granules would be missing");
   refuse_physics_that_would_miss_granules();
+  refuse_measures_of_other_physics();
+}
+
+void DeckRules::refuse_measures_of_other_physics() const {
+  for (int c = 0; c < modify->ncompute; ++c) {
+    const ComputeStyle& style = measure_of(modify->compute[c]->style);
+    if (style.measure == Measure::refused)
+      refuse(named(modify->compute[c]) + ": " + style.why + "; leave the compute or the fix out");
+  }
 }
 
 void DeckRules::refuse_physics_that_would_miss_granules() const {
@@ -74,23 +118,40 @@ bool DeckRules::find_movable(EngineAtoms& atoms, const Run& run) {
     if (std::strcmp(fix->style, own_->style) == 0) continue;
     if (std::strcmp(fix->style, "gravity") == 0) atoms.gravity_bits |= fix->groupbit;
     const FixStyle& style = treatment_of(fix->style);
-    switch (style.treatment) {
-      case Treatment::integrates:
-        atoms.movable_bits |= fix->groupbit;
-        break;
-      case Treatment::drives:
-        if (told_.insert(fix->id).second)
-          run.say("fix " + std::string(fix->id) + " (" + fix->style + ") " + style.why + ": granules of its group are not culled");
-        atoms.held_bits |= fix->groupbit;
-        break;
-      case Treatment::holds:
-        atoms.held_bits |= fix->groupbit;
-        break;
-      default:
-        break;
-    }
+    if (style.treatment == Treatment::integrates) atoms.movable_bits |= fix->groupbit;
+    if (style.treatment == Treatment::holds || style.treatment == Treatment::drives) atoms.held_bits |= fix->groupbit;
+    if (style.treatment == Treatment::drives)
+      say_once(run, named(fix) + " " + style.why + ": granules of its group are not culled");
   }
+  for (int c = 0; c < modify->ncompute; ++c) {
+    const LAMMPS_NS::Compute* compute = modify->compute[c];
+    const ComputeStyle& style = measure_of(compute->style);
+    if (style.measure != Measure::whole || !is_of_the_deck(compute)) continue;
+    atoms.held_bits |= compute->groupbit;
+    say_once(run, named(compute) + " " + with_id(style.why, own_->id) + ": granules of its group are not culled");
+  }
+  say_what_sees_atoms_only(run);
   return bits() != before;
+}
+
+void DeckRules::say_what_sees_atoms_only(const Run& run) {
+  Names of_atoms, of_contacts;
+  for (int c = 0; c < modify->ncompute; ++c) {
+    const LAMMPS_NS::Compute* compute = modify->compute[c];
+    if (!is_of_the_deck(compute)) continue;
+    const Measure measure = measure_of(compute->style).measure;
+    if (measure == Measure::atoms_only) of_atoms.add(named(compute));
+    if (measure == Measure::contacts) of_contacts.add(named(compute));
+  }
+  for (int f = 0; f < modify->nfix; ++f)
+    if (treatment_of(modify->fix[f]->style).treatment == Treatment::atoms_only) of_atoms.add(named(modify->fix[f]));
+  if (!of_atoms.empty()) say_once(run, "interior granules are missing in what these measure: " + of_atoms.text());
+  if (!of_contacts.empty())
+    say_once(run, "contacts inside solid bodies are missing in what these measure: " + of_contacts.text());
+}
+
+void DeckRules::say_once(const Run& run, const std::string& line) {
+  if (said_.insert(line).second) run.say(line);
 }
 
 std::string state_that_no_fix_has(LAMMPS_NS::Modify& modify) {

@@ -23,9 +23,12 @@ class DeckRules : protected LAMMPS_NS::Pointers {
 
  private:
   void refuse_physics_that_would_miss_granules() const;
+  void refuse_measures_of_other_physics() const;
+  void say_what_sees_atoms_only(const Run& run);
+  void say_once(const Run& run, const std::string& line);
 
   const LAMMPS_NS::Fix* own_;
-  std::set<std::string> told_;  // fixes whose groups stay exterior
+  std::set<std::string> said_;
 };
 
 /// One line on granules in a restart file that no fix of the deck has taken up; empty where there are none. Local, alike on all

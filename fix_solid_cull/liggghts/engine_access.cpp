@@ -13,6 +13,7 @@
 #include "fix_contact_history.h"
 #include "fix_insert.h"
 #include "fix_insert_pack.h"
+#include "fix_massflow_mesh.h"
 #include "memory.h"
 #include "modify.h"
 #include "neigh_list.h"
@@ -45,6 +46,7 @@ SOLIDCULL_EXPOSE(HistoryPartners, FixContactHistory, int**, partner_)
 SOLIDCULL_EXPOSE(HistoryNumbers, FixContactHistory, double**, contacthistory_)
 SOLIDCULL_EXPOSE(InsertCompress, FixInsert, bool, compress_flag)
 SOLIDCULL_EXPOSE(PackRegion, FixInsertPack, LAMMPS_NS::Region*, ins_region)
+SOLIDCULL_EXPOSE(CountingMesh, FixMassflowMesh, LAMMPS_NS::FixMeshSurface*, fix_mesh_)
 SOLIDCULL_EXPOSE(ThermoAtoms, Thermo, LAMMPS_NS::bigint, last_natoms)
 SOLIDCULL_EXPOSE(HistoryIntPages, FixContactHistory, LAMMPS_NS::MyPage<int>*, ipage_)
 SOLIDCULL_EXPOSE(HistoryPages, FixContactHistory, LAMMPS_NS::MyPage<double>*, dpage_)
@@ -98,6 +100,11 @@ void expect_atoms(LAMMPS_NS::Thermo& thermo, long change) { thermo.*member(Therm
 const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::Fix* fix) {
   const auto* pack = dynamic_cast<const LAMMPS_NS::FixInsertPack*>(fix);
   return pack ? pack->*member(PackRegion()) : nullptr;
+}
+
+LAMMPS_NS::FixMeshSurface* counting_mesh(const LAMMPS_NS::Fix* fix) {
+  const auto* counts = dynamic_cast<const LAMMPS_NS::FixMassflowMesh*>(fix);
+  return counts ? counts->*member(CountingMesh()) : nullptr;
 }
 
 void renew_pages(LAMMPS_NS::FixContactHistory& fix, int one_atom, int page) {

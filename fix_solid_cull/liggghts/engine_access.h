@@ -12,6 +12,7 @@ class Atom;
 class Fix;
 class FixContactHistory;
 class FixInsert;
+class FixMeshSurface;
 class LAMMPS;
 class Memory;
 class Modify;
@@ -55,6 +56,8 @@ const double* const* history_numbers(const LAMMPS_NS::FixContactHistory& fix);
 
 /// Whether the fix renumbers all granules when it inserts (compress_tags).
 bool compresses_tags(const LAMMPS_NS::FixInsert& fix);
+/// The mesh at which a fix massflow/mesh counts; nullptr for other fixes.
+LAMMPS_NS::FixMeshSurface* counting_mesh(const LAMMPS_NS::Fix* fix);
 /// Thermo output stops the run when it counts fewer atoms than the time before ("Lost atoms"): tells it of atoms that went into
 /// the store (negative) or came back, so that truly lost ones are still found.
 void expect_atoms(LAMMPS_NS::Thermo& thermo, long change);

@@ -55,7 +55,7 @@ FixSolidCull::~FixSolidCull() {
 void FixSolidCull::publish_flags() {
   scalar_flag = 1;
   vector_flag = 1;
-  size_vector = Report::counts + Report::carried;
+  size_vector = Report::counts + Report::carried + Report::of_all;
   global_freq = 1;
   extscalar = 1;
   extvector = 0;

@@ -1,7 +1,6 @@
 #include "fix_styles.h"
 
-#include <algorithm>
-#include <cstring>
+#include "style_table.h"
 
 namespace solidcull {
 namespace {
@@ -10,6 +9,7 @@ constexpr Treatment exact = Treatment::exact, integrates = Treatment::integrates
                     holds = Treatment::holds, drives = Treatment::drives, refused = Treatment::refused;
 
 constexpr const char* adds_forces = "adds forces that culled granules would miss";
+constexpr const char* no_spins = "does not turn granules, and solid bodies turn";
 constexpr const char* marks_granules = "marks or times granules one by one, and culled ones would be left out";
 constexpr const char* no_clumps = "multisphere clumps are not supported yet";
 constexpr const char* spheres_only = "only spheres are supported";
@@ -27,13 +27,13 @@ constexpr FixStyle styles[] = {
     {"contacthistory*", exact, ""},
     {"neighlist/mesh", exact, ""},
     // material, walls, insertion
-    {"check/timestep/gran", exact, ""},
     {"custom_property/global", exact, ""},
     {"gravity", exact, ""},
     {"insert/*", exact, ""},
     {"mesh/surface*", exact, ""},
     {"move/mesh*", exact, ""},
     {"particledistribution/*", exact, ""},
+    {"diam/max", exact, ""},
     {"particletemplate/sphere", exact, ""},
     {"print", exact, ""},
     {"property/atom", exact, ""},
@@ -42,23 +42,21 @@ constexpr FixStyle styles[] = {
     {"region/variable", exact, ""},
     {"store/state", exact, ""},
     {"wall/gran*", exact, ""},
+    // they hand on what others measure
+    {"ave/correlate", exact, ""},
+    {"ave/time", exact, ""},
+    // stored granules near its mesh are made atoms
+    {"massflow/mesh", exact, ""},
 
-    {"nve", integrates, ""},
-    {"nve/limit", integrates, ""},
     {"nve/sphere", integrates, ""},
 
-    {"ave/correlate", atoms_only, ""},
     {"ave/euler*", atoms_only, ""},
     {"ave/histo", atoms_only, ""},
     {"ave/spatial", atoms_only, ""},
-    {"ave/time", atoms_only, ""},
+    {"check/timestep/gran", atoms_only, ""},
     {"contactproperty/atom*", atoms_only, ""},
     {"continuum/weighted", atoms_only, ""},
-    {"deform/check", atoms_only, ""},
-    {"diam/max", atoms_only, ""},
-    {"massflow/mesh*", atoms_only, ""},
     {"store/force", atoms_only, ""},
-    {"viscous", atoms_only, ""},
 
     {"aveforce", holds, ""},
     {"enforce2d", holds, ""},
@@ -76,11 +74,15 @@ constexpr FixStyle styles[] = {
     {"efield", drives, adds_forces},
     {"external", drives, adds_forces},
     {"fiber/spring/simple", drives, adds_forces},
+    {"massflow/mesh/sieve", drives, adds_forces},
     {"momentum", drives, "changes velocities of its group as a whole, and would miss culled granules"},
+    {"nve", drives, no_spins},
+    {"nve/limit", drives, "limits the speed of each granule and does not turn it, and solid bodies turn"},
     {"property/atom/regiontracer/time", drives, marks_granules},
-    {"property/atom/timetracer", drives, marks_granules},
     {"property/atom/tracer*", drives, marks_granules},
-    {"spring*", drives, adds_forces},
+    {"spring", drives, adds_forces},
+    {"spring/self", drives, adds_forces},
+    {"viscous", drives, adds_forces},
     {"wall/region", drives, adds_forces},
 
     {"adapt", refused, "radii that change (fix adapt) would leave the culled granules behind"},
@@ -89,7 +91,7 @@ constexpr FixStyle styles[] = {
     {"check/timestep/sph", refused, no_sph},
     {"concave", refused, no_clumps},
     {"couple/*", refused, no_fluid},
-    {"deform", refused, box_changes},
+    {"deform*", refused, box_changes},
     {"dt/reset", refused, "the time step would change within a run, and the scales of culling follow from it"},
     {"heat/*", refused, no_heat},
     {"multicontact/*", refused, "contacts that act on each other would miss those of culled granules"},
@@ -101,25 +103,18 @@ constexpr FixStyle styles[] = {
     {"nve/superquadric", refused, spheres_only},
     {"particletemplate/multi*", refused, no_clumps},
     {"particletemplate/superquadric", refused, spheres_only},
+    {"property/atom/timetracer", refused, "LIGGGHTS has no such style any more: it is property/atom/regiontracer/time now"},
     {"rigid*", refused, "rigid clumps of granules are not supported yet"},
     {"sph/*", refused, no_sph},
+    {"spring/rg", refused, "LIGGGHTS needs a mass for each type there, and granules have their own"},
     {"transportequation/*", refused, "what it transports would be lost with the culled granules"},
     {"wall/region/sph", refused, no_sph},
     {"wall/sph", refused, no_sph},
 };
 constexpr FixStyle unknown = {"", drives, "is no fix of LIGGGHTS's own that solid/cull knows"};
 
-bool names(const FixStyle& entry, const std::string& style) {
-  const std::size_t n = std::strlen(entry.name);
-  return entry.name[n - 1] == '*' ? style.compare(0, n - 1, entry.name, n - 1) == 0 : style == entry.name;
-}
-
 }  // namespace
 
-const FixStyle& treatment_of(const std::string& style) {
-  const auto* const found =
-      std::find_if(std::begin(styles), std::end(styles), [&](const FixStyle& s) { return names(s, style); });
-  return found == std::end(styles) ? unknown : *found;
-}
+const FixStyle& treatment_of(const std::string& style) { return row_of(style, styles, unknown); }
 
 }  // namespace solidcull

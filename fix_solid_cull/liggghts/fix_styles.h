@@ -1,4 +1,4 @@
-// What becomes of culling beside each fix style of LIGGGHTS. The same table stands in fix_solid_cull.md; a test compares them,
+// What becomes of culling beside each fix style of LIGGGHTS. The same table stands in other_styles.md; a test compares them,
 // and that every style of `liggghts -h` is in it.
 #pragma once
 

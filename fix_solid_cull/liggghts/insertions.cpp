@@ -1,12 +1,15 @@
 #include "insertions.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "engine_access.h"
 #include "fix_insert.h"
+#include "fix_mesh_surface.h"
 #include "modify.h"
 #include "region.h"
+#include "tri_mesh.h"
 #include "update.h"
 
 namespace solidcull {
@@ -46,6 +49,25 @@ std::vector<Box> EngineInsertions::boxes(bool soon, double margin) const {
     if (region && region->bboxflag)
       boxes.push_back({Vec3(region->extent_xlo, region->extent_ylo, region->extent_zlo) - reach,
                        Vec3(region->extent_xhi, region->extent_yhi, region->extent_zhi) + reach});
+  }
+  return boxes;
+}
+
+std::vector<Box> EngineInsertions::counting(double margin) const {
+  std::vector<Box> boxes;
+  for (int f = 0; f < modify->nfix; ++f) {
+    LAMMPS_NS::FixMeshSurface* mesh = engine::counting_mesh(modify->fix[f]);
+    if (!mesh) continue;
+    LAMMPS_NS::TriMesh* triangles = mesh->triMesh();
+    Box box{Vec3::Constant(HUGE_VAL), Vec3::Constant(-HUGE_VAL)};
+    for (int t = 0; t < triangles->sizeLocal() + triangles->sizeGhost(); ++t)
+      for (int k = 0; k < 3; ++k) {
+        double node[3];
+        triangles->node(t, k, node);
+        box.lo = box.lo.cwiseMin(vec(node));
+        box.hi = box.hi.cwiseMax(vec(node));
+      }
+    if (box.lo[0] <= box.hi[0]) boxes.push_back({box.lo - Vec3::Constant(margin), box.hi + Vec3::Constant(margin)});
   }
   return boxes;
 }

@@ -1,4 +1,4 @@
-// LIGGGHTS's fixes that insert granules.
+// LIGGGHTS's fixes that insert granules, or count those that pass a mesh.
 #pragma once
 
 #include <vector>
@@ -16,6 +16,7 @@ class EngineInsertions : public Insertions, protected LAMMPS_NS::Pointers {
   bool any_due(std::int64_t step) const override;
   std::vector<Box> boxes(bool soon, double margin) const override;
   bool has_inserted() const override;
+  std::vector<Box> counting(double margin) const override;
 };
 
 }  // namespace solidcull

@@ -444,7 +444,7 @@ TEST(Scenes, ARunThatStartsWithAnEmptyBoxIsCulledToo) {
   Bed bed;
   bed.name = "pour";
   Engine e;
-  e.run(pouring(bed) + "fix cull all solid/cull\nfix visc all viscous 0.002\nrun 12000\n");
+  e.run(pouring(bed) + "fix cull all solid/cull\nfix visc all viscous 0.002\nrun 12000\nunfix visc\n");
   expect_all_there(e, "cull", bed.granules);
   // it still trembles: what spins about a lone contact is stopped by hand
   for (int k = 0; k < 4; ++k) e.run("velocity all set 0 0 0\nset group all omegax 0 omegay 0 omegaz 0\nrun 1500\n");

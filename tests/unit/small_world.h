@@ -226,6 +226,7 @@ class SmallInsertions : public Insertions {
   bool any_due(std::int64_t step) const override;
   std::vector<Box> boxes(bool soon, double margin) const override;
   bool has_inserted() const override { return inserted; }
+  std::vector<Box> counting(double) const override { return {}; }
   bool inserted = false;
 
  private:

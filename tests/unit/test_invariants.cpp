@@ -161,7 +161,28 @@ TEST(Report, counts_who_is_where) {
     EXPECT_NEAR(two.parts.report.value(n), expected[n], 1e-15) << n;
   }
   EXPECT_EQ(two.parts.report.value(-1), 0);
-  EXPECT_EQ(two.parts.report.value(Report::counts + Report::carried), 0);
+  EXPECT_EQ(two.parts.report.value(Report::counts + Report::carried + Report::of_all), 0);
+}
+
+TEST(Report, says_what_all_granules_have_together) {
+  TwoBodies two(Vec3(0.3, 0, 0));
+  two.world.add(50, Vec3(0, -0.1, 0), r, Vec3(0, 0, 2), Vec3(30, 0, 0));
+  two.parts.motion.is_stale();
+  two.parts.motion.refresh();
+  two.parts.motion.give_velocities();  // interface granules move with their bodies
+  const double m = two.world.mass_of(r), inertia = 0.4 * m * r * r;
+  double before[Report::of_all];
+  const int first = Report::counts + Report::carried;
+  for (int n = 0; n < Report::of_all; ++n) before[n] = two.parts.report.value(first + n);
+  EXPECT_NEAR(before[0], 9 * m, 1e-12 * m);
+  const double of_bodies = before[4] + before[5] - 0.5 * m * 4 - 0.5 * inertia * 900;
+  EXPECT_NEAR(of_bodies,
+              two.parts.solid.kinetic_energy(two.parts.body_of(1)) + two.parts.solid.kinetic_energy(two.parts.body_of(11)),
+              1e-12 * before[4]);
+  two.parts.put_away({4, 14});  // whoever is stored, the sums are the same
+  ++two.world.run.step;
+  for (int n = 0; n < Report::of_all; ++n)
+    EXPECT_NEAR(two.parts.report.value(first + n), before[n], 1e-12 * (std::abs(before[n]) + r)) << n;
 }
 
 TEST(Report, counts_anew_when_membership_has_changed_or_a_step_has_passed) {
