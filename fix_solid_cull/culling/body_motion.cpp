@@ -1,10 +1,21 @@
 #include "body_motion.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "numbers.h"
 #include "release.h"
+#include "run_failure.h"
 
 namespace solidcull {
+
+namespace {
+
+bool moves_by_numbers(const SolidBody& b) {
+  return std::isfinite(b.pose.origin().sum() + b.pose.quaternion().coeffs().sum() + b.twist.velocity.sum() + b.twist.spin.sum());
+}
+
+}  // namespace
 
 void BodyMotion::refresh() {
   if (!stale_) return;
@@ -80,9 +91,10 @@ void BodyMotion::take_loads() {
   for (ActiveBody& a : active_) a.force = a.torque = a.change = Vec3::Zero();
   for (std::size_t k = 0; k < atoms_.size(); ++k) {
     const int i = atoms_[k];
-    const Vec3 in_world = atoms.force(i);
+    const Vec3 in_world = atoms.force(i), torque = vec(atoms.torque + 3 * std::size_t(i));
+    if (!std::isfinite(in_world.sum() + torque.sum())) is_no_number(atoms.tag[i], "load", in_world);
     ActiveBody& a = active_[slot_[k]];
-    if (moves && !a.stands) add_to_body(k, in_world - atoms.mass[i] * g, vec(atoms.torque + 3 * std::size_t(i)));
+    if (moves && !a.stands) add_to_body(k, in_world - atoms.mass[i] * g, torque);
     if (a.stands) a.change += in_world - atoms.mass[i] * g;
     const double tolerance = law.tolerance(atoms.mass[i], shell_[i].normal_load);
     largest_excess_ = std::max(largest_excess_, shell_.take_load(i, a.body->pose.turned_to_frame(in_world), tolerance));
@@ -140,7 +152,18 @@ void BodyMotion::kick_and_drift() {
       b.shift(shift);
     }
     b.take_twist();
+    if (!moves_by_numbers(b)) stop_at(a);
   }
+}
+
+/// A load too large for its time step has taken the body out of all numbers.
+void BodyMotion::stop_at(const ActiveBody& a) const {
+  const auto at = std::find_if(atoms_.begin(), atoms_.end(), [&](int i) { return shell_[i].body == a.number; });
+  if (at == atoms_.end())
+    throw RunFailure("the motion of solid body " + std::to_string(a.number) + " is no number: take a smaller timestep");
+  const Twist& t = a.body->twist;
+  const bool goes = std::isfinite(t.velocity.sum());
+  is_no_number(ports_.atoms.tag[*at], goes ? "spin" : "velocity", goes ? t.spin : t.velocity);
 }
 
 void BodyMotion::kick() {

@@ -289,6 +289,7 @@ class Run {
 
   std::int64_t deck_step() const { return step + reset_by; }
   Vec3 edges() const { return box.hi - box.lo; }
+  bool keeps(const Vec3& x) const { return (x.array() >= kept.lo.array()).all() && (x.array() < kept.hi.array()).all(); }
   bool any_periodic() const { return periodic[0] || periodic[1] || periodic[2]; }
 
   virtual Vec3 gravity() const = 0;                   ///< m/s^2, now
