@@ -586,7 +586,10 @@ std::vector<SmallWalls::Touch> SmallWalls::find(double gap) const {
 
 std::vector<WallContact> SmallWalls::contacts() const {
   std::vector<WallContact> all;
-  for (const Touch& t : find(world_.run.skin)) all.push_back({t.granule, t.to_wall, t.gap, t.moving});
+  for (const Touch& t : find(world_.run.skin)) {
+    const bool half = t.mesh >= 0 && !t.moving;
+    if (!half || t.gap < 0.5 * world_.run.skin) all.push_back({t.granule, t.to_wall, t.gap, t.moving});
+  }
   return all;
 }
 
