@@ -366,6 +366,13 @@ class ContactModelChanges(Case):
                                 "the restart file holds contact histories of 3 numbers and this deck's contact model has 0: use the "
                                 "contact model that the file was written with")
 
+    def test_friction_that_comes_while_granules_are_culled(self):
+        smooth = BLOCK.replace(HERTZ, "gran model hertz tangential off")
+        run = Run(smooth + f"{CULL_BLOCK}\nrun 200\npair_style {self.PLAIN}\npair_coeff * *\nrun 10\n")
+        self.assertEqual(run.errors(run.screen), [
+            "ERROR: fix cull solid/cull: the contact model has, or had, neither friction nor rolling friction, and changes while "
+            "granules are culled: unfix cull before the pair_style changes"], run.output[-600:])
+
     def test_another_contact_model_while_granules_are_culled(self):
         run = Run(BLOCK + f"{CULL_BLOCK}\nrun 200\npair_style {self.PLAIN}\npair_coeff * *\nrun 10\n")
         self.assertNotEqual(run.status, 0)

@@ -34,6 +34,11 @@ void Culling::begin_run() {
     throw InputError("the contact model's history has changed from " + std::to_string(p_.solid.contacts().width()) + " to " +
                      std::to_string(flips.size()) + " numbers while granules are culled: unfix " + p_.ports.run.name +
                      " before the pair_style changes");
+  if (!p_.solid.set_granules_turn(p_.ports.contacts.turn_granules))
+    throw InputError(
+        "the contact model has, or had, neither friction nor rolling friction, and changes while granules are culled: "
+        "unfix " +
+        p_.ports.run.name + " before the pair_style changes");
   p_.ports.ranks.update();
   Vec3 periods = p_.ports.run.edges();
   for (int d = 0; d < 3; ++d)

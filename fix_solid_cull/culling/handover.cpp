@@ -69,7 +69,9 @@ std::vector<LostGranule> Handover::take_over() {
     arrivals_.erase(tag);
   }
   std::vector<LostGranule> lost;
-  arrivals_.for_each([&](std::int64_t tag, const Arrival& a) { lost.push_back({tag, {a.mass, a.at.position, a.radius, a.held}}); });
+  arrivals_.for_each([&](std::int64_t tag, const Arrival& a) {
+    lost.push_back({tag, {a.mass, a.at.position, a.radius, a.held}});
+  });
   std::sort(lost.begin(), lost.end(), [](const LostGranule& a, const LostGranule& b) { return a.tag < b.tag; });
   arrivals_.clear();
   return lost;

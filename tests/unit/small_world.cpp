@@ -337,9 +337,9 @@ void SmallAtoms::pack(int i, std::vector<double>& record, int& layout) {
   record[colour_word] = colour[k];
 }
 
-std::vector<int> SmallAtoms::motion_words(int, bool positions) {
+std::vector<int> SmallAtoms::motion_words(int, bool positions, bool spins) {
   std::vector<int> numbers;
-  for (int w = positions ? at_word : velocity_word; w < radius_word; ++w) numbers.push_back(w);
+  for (int w = positions ? at_word : velocity_word; w < (spins ? radius_word : spin_word); ++w) numbers.push_back(w);
   return numbers;
 }
 
