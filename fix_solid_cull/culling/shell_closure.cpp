@@ -277,20 +277,24 @@ bool ShellClosure::may_leave_its_walls(int i) const {
 /// atoms those stay whose body may move, and a mesh is within the skin of them.
 void ShellClosure::leave_out_near_meshes(std::vector<int>& atoms) const {
   std::vector<Sphere> spheres;
-  for (const int i : atoms) spheres.push_back(ports_.atoms.sphere(i));
+  std::vector<int> of;
+  for (const int i : atoms)
+    if (!solid_.stands(shell_[i].body)) {
+      spheres.push_back(ports_.atoms.sphere(i));
+      of.push_back(i);
+    }
+  if (spheres.empty()) return;
   SphereCells cells;
   cells.build(std::move(spheres), 2 * scales_.diameter());
-  const Vec3 reach = Vec3::Constant(cells.largest_radius() + ports_.run.skin);
-  std::vector<char> near(atoms.size(), 0);
+  const double skin = ports_.run.skin;
+  const Vec3 reach = Vec3::Constant(cells.largest_radius() + skin);
+  std::set<int> near;
   for (const WallTriangle& t : ports_.walls.triangles())
     cells.for_each_in_box(t.box.lo - reach, t.box.hi + reach, [&](std::size_t k, const Sphere& s) {
-      near[k] = near[k] || (!solid_.stands(shell_[atoms[k]].body) && ports_.walls.near(t, s, ports_.run.skin));
+      if (!near.count(of[k]) && ports_.walls.near(t, s, skin)) near.insert(of[k]);
       return true;
     });
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < atoms.size(); ++k)
-    if (!near[k]) atoms[kept++] = atoms[k];
-  atoms.resize(kept);
+  atoms.erase(std::remove_if(atoms.begin(), atoms.end(), [&](int i) { return near.count(i) != 0; }), atoms.end());
 }
 
 bool ShellClosure::ask_to_store(const std::vector<int>& interface_atoms) {
