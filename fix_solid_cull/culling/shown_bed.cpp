@@ -47,7 +47,7 @@ void ShownBed::show_interface() {
     interface_.push_back({e, atoms.velocity(i), atoms.spin(i)});
     if (e.lock_step == ports_.run.step) {  // no step has passed since: the deck sees the motion that it had
       atoms.set_velocity(i, e.velocity);
-      atoms.set_spin(i, e.spin);
+      if (ports_.contacts.turn_granules) atoms.set_spin(i, e.spin);
     }
     note(i, false);
   }
@@ -68,14 +68,14 @@ void ShownBed::show_stored() {
       const Vec3 near = scales_.compact() ? Vec3(0.5 * (ports_.run.box.lo + ports_.run.box.hi)) : atoms.place(i);
       atoms.set_place(i, solid_.nearest_image(x, near));
       atoms.set_velocity(i, body.twist.at(x));
-      atoms.set_spin(i, body.twist.spin);
+      if (ports_.contacts.turn_granules) atoms.set_spin(i, body.twist.spin);
     }
     atoms.mark_interface(i, false);
     shell_.label(i, groups_.key_of(g.body));
     note(i, true);
   }
-  if (!tags.empty())
-    motion_words_ = atoms.motion_words(atoms.owned - 1, !ports_.run.any_periodic() || scales_.compact());
+  const bool places = !ports_.run.any_periodic() || scales_.compact();
+  if (!tags.empty()) motion_words_ = atoms.motion_words(atoms.owned - 1, places, ports_.contacts.turn_granules);
 }
 
 void ShownBed::note(int i, bool stored) {
