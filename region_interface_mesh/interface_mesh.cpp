@@ -213,8 +213,11 @@ struct InterfaceMesh::Impl {
   struct Box {
     Vec3 lo, hi;
   };
-  std::optional<Box> box;  // answers that cost a pass over the grid, kept until it changes
+  // answers that cost a pass over the grid, kept until it changes
+  std::optional<Box> box;
   std::optional<double> enclosed;
+  std::optional<bool> holds_nothing;
+  std::size_t passes = 0;
 
   Impl(double voxel_, double closing_) : voxel(voxel_), closing(closing_) {
     start_openvdb();
@@ -246,6 +249,7 @@ struct InterfaceMesh::Impl {
     queued_spheres = 0;
     box.reset();
     enclosed.reset();
+    holds_nothing.reset();
     prune_when_due();
   }
 
@@ -284,6 +288,7 @@ struct InterfaceMesh::Impl {
   openvdb::Vec3d in_voxels(const Vec3& p) const { return openvdb::Vec3d(p.x(), p.y(), p.z()) / voxel; }
 
   const Box& bounding_box();
+  bool nothing_inside();
 };
 
 /// The box around the zero set of the trilinear field: each coordinate of that set is extreme on an edge between two voxel
@@ -291,6 +296,7 @@ struct InterfaceMesh::Impl {
 const InterfaceMesh::Impl::Box& InterfaceMesh::Impl::bounding_box() {
   const FloatTree& tree = grid().constTree();
   if (box) return *box;
+  ++passes;
   using openvdb::Coord;
   Vec3 lo = Vec3::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
   openvdb::tree::ValueAccessor<const FloatTree, /*IsSafe=*/false> at(tree);
@@ -364,13 +370,22 @@ void InterfaceMesh::merge(InterfaceMesh&& other) {
   impl_->enqueue(std::move(emptied), spheres);
 }
 
-bool InterfaceMesh::empty() const {
-  const FloatTree& tree = impl_->grid().constTree();
+bool InterfaceMesh::Impl::nothing_inside() {
+  const FloatTree& tree = grid().constTree();
+  ++passes;
   for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
     for (openvdb::Index n = 0; n < FloatTree::LeafNodeType::SIZE; ++n)
       if (leaf->getValue(n) < 0.0f) return false;
   return true;
 }
+
+bool InterfaceMesh::empty() const {
+  impl_->grid();
+  if (!impl_->holds_nothing) impl_->holds_nothing = impl_->nothing_inside();
+  return *impl_->holds_nothing;
+}
+
+std::size_t InterfaceMesh::passes() const { return impl_->passes; }
 
 bool InterfaceMesh::inside(const Vec3& p) const { return signed_distance(p) < 0.0; }
 
@@ -406,6 +421,7 @@ void InterfaceMesh::bounds(Vec3& lo, Vec3& hi) const {
 double InterfaceMesh::volume() const {
   const FloatTree& tree = impl_->grid().constTree();
   if (impl_->enclosed) return *impl_->enclosed;
+  ++impl_->passes;
   const auto ramp = [](double voxels, double width) { return std::clamp(0.5 - voxels / width, 0.0, 1.0); };
   double voxels_inside = 0.0;
   for (auto value = tree.cbeginValueAll(); value; ++value) {

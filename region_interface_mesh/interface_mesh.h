@@ -71,6 +71,7 @@ class InterfaceMesh {
   std::string to_bytes() const;
   static InterfaceMesh from_bytes(const std::string& bytes, double voxel, double closing);
 
+  std::size_t passes() const;  ///< how often an answer has cost a pass over the whole grid
   std::size_t active_voxels() const;
   std::size_t memory_bytes() const;
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 
 #include "comm.h"
 #include "error.h"
@@ -19,20 +21,28 @@ RegInterfaceMesh::RegInterfaceMesh(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
   cmax = 1;
   contact = new Contact[cmax];
   shape_update();
+  made_ = true;
 }
 
 RegInterfaceMesh::~RegInterfaceMesh() { delete[] contact; }
 
+/// Only the command is given on all ranks alike: of the questions, ranks without atoms ask none.
+void RegInterfaceMesh::refuse() const {
+  const std::string line = "region interface/mesh: '" + fix_ + "' is no fix solid/cull: define the fix before the region, and " +
+                           "delete the region before the fix";
+  if (!made_ || comm->nprocs == 1) error->all(FLERR, line.c_str());
+  std::fprintf(stderr, "ERROR: %s\n", line.c_str());  // MPI_Abort drops what is buffered
+  std::fflush(nullptr);
+  error->one(FLERR, line.c_str());
+  std::abort();  // both end the program
+}
+
 void RegInterfaceMesh::shape_update() {
   const int f = modify->find_fix(fix_.c_str());
   auto* source = f >= 0 ? dynamic_cast<InterfaceMeshSource*>(modify->fix[f]) : nullptr;
-  if (!source) {
-    const std::string line = "region interface/mesh: '" + fix_ +
-                             "' is no fix solid/cull: define the fix before the region, and " +
-                             "delete the region before the fix";
-    error->all(FLERR, line.c_str());
-  }
+  if (!source) refuse();
   meshes_ = &source->interface_meshes();
+  source_ = source->source();
   Vec3 lo = Vec3::Constant(HUGE_VAL), hi = Vec3::Constant(-HUGE_VAL);
   for (const auto& mesh : *meshes_) {
     if (mesh.second.empty()) continue;
@@ -52,7 +62,8 @@ void RegInterfaceMesh::shape_update() {
   extent_zhi = hi[2];
 }
 
-double RegInterfaceMesh::distance(const Vec3& p, const InterfaceMesh*& nearest) const {
+double RegInterfaceMesh::distance(const Vec3& p, const InterfaceMesh*& nearest) {
+  if (source_.expired()) shape_update();  // the engine asks for that once in a time step only, and fixes go between runs
   double least = HUGE_VAL;
   nearest = nullptr;
   for (const auto& mesh : *meshes_) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
 
 #include "interface_mesh.h"
@@ -21,10 +22,14 @@ class RegInterfaceMesh : public LAMMPS_NS::Region {
 
  private:
   /// Level set of the nearest body at p and that body (nullptr if there is none).
-  double distance(const Vec3& p, const InterfaceMesh*& nearest) const;
+  double distance(const Vec3& p, const InterfaceMesh*& nearest);
   int contact_with(double* x, double distance, double cutoff, const InterfaceMesh* body);
 
+  [[noreturn]] void refuse() const;
+
   std::string fix_;
+  bool made_ = false;  // the command is done
+  std::weak_ptr<const void> source_;
   const std::map<int, InterfaceMesh>* meshes_ = nullptr;
 };
 

@@ -288,7 +288,7 @@ class KeywordRefusals(Case):
 
 
 class FileRefusals(Case):
-    REASON = "No such file or directory; nothing of the run is lost but it stops here"
+    REASON = "No such file or directory; write it elsewhere, or leave the keyword out"
 
     def test_bed_file_in_a_missing_folder(self):
         self.refused_by_fix(deck(FIX + " bed 10 missing/bed.*.vtp", "run 20"),
@@ -326,6 +326,21 @@ class RegionRefusals(Case):
     def test_fix_that_was_deleted(self):
         self.refused(deck(FIX, "region solid interface/mesh cull", "unfix cull", "group inner region solid"), self.line("cull"))
 
+    # asked once in a time step already, the engine asks for no new shape in that step
+    ASKED = (BLOCK + CULL_BLOCK + "\nregion solid interface/mesh cull\nvariable n equal count(all,solid)\nrun 200\n"
+             'print "first $n"\nunfix cull\n')
+
+    def test_fix_that_was_deleted_after_a_question(self):
+        run = self.refused(self.ASKED + 'print "then $n"\n', self.line("cull"))
+        self.assertGreater(int(re.search(r"^first (\d+)$", run.log, re.M).group(1)), 0)
+
+    def test_fix_that_was_deleted_and_made_anew(self):
+        run = self.accepted(self.ASKED + CULL_BLOCK + '\nprint "then $n"\nrun 200\nprint "last $n"\n')
+        first, then, last = (int(re.search(rf"^{word} (\d+)$", run.log, re.M).group(1)) for word in ("first", "then", "last"))
+        self.assertEqual(then, 0, "the new fix has culled nothing yet")
+        self.assertGreater(first, 0)
+        self.assertGreater(last, 0)
+
     def test_no_fix_named(self):
         self.refused(deck(FIX, "region solid interface/mesh"), "region interface/mesh: give the ID of a fix solid/cull")
 
@@ -357,11 +372,73 @@ class ContactModelChanges(Case):
                                 "the restart file holds contact histories of 3 numbers and this deck's contact model has 0: use the "
                                 "contact model that the file was written with")
 
+    def test_friction_that_comes_while_granules_are_culled(self):
+        smooth = BLOCK.replace(HERTZ, "gran model hertz tangential off")
+        run = Run(smooth + f"{CULL_BLOCK}\nrun 200\npair_style {self.PLAIN}\npair_coeff * *\nrun 10\n")
+        self.assertEqual(run.errors(run.screen), [
+            "ERROR: fix cull solid/cull: the contact model has, or had, neither friction nor rolling friction, and changes while "
+            "granules are culled: unfix cull before the pair_style changes"], run.output[-600:])
+
     def test_another_contact_model_while_granules_are_culled(self):
         run = Run(BLOCK + f"{CULL_BLOCK}\nrun 200\npair_style {self.PLAIN}\npair_coeff * *\nrun 10\n")
         self.assertNotEqual(run.status, 0)
         self.assertEqual(len(run.errors(run.screen)), 1, f"one line must say what is wrong; instead:\n{run.output[-600:]}")
         self.assertRegex(run.errors(run.screen)[0], "^ERROR: fix cull solid/cull: ")
+
+
+class Breakdowns(Case):
+    """Motions that are no numbers any more: one line with tag and step, where the stock engine goes on or crashes."""
+    PUSH = "variable push equal {}\ngroup one id {}\nfix push one addforce v_push 0 0\n"
+    NOT_A_NUMBER, INFINITE = "exp(1000)-exp(1000)", "exp(1000)"
+
+    def broken(self, lines, of, cull=CULL_BLOCK, before="run 200\n", **how):
+        run = Run(BLOCK + cull + "\n" + before + lines + "run 200\n", **how)
+        told = f"screen:\n{run.screen[-1500:]}\noutput:\n{run.output[-1500:]}"
+        errors = [line for line in run.output.splitlines() if line.startswith("ERROR")]
+        self.assertEqual(len(errors), 1, told)
+        self.assertRegex(errors[0], r"^ERROR: fix cull solid/cull: on rank \d at step \d+: the (place|velocity|spin|load) of granule " +
+                         of + r" is no number \([-+.\w ]+\): take a smaller timestep, and create no granule inside another$", told)
+        self.assertNotIn("Signal", run.output)
+        self.assertNotEqual(run.status, 0)
+
+    def test_two_granules_in_one_place(self):
+        lines = "create_atoms 1 single 0.0105 0.0105 0.0195 units box\n" * 2 + "set group all diameter 0.003 density 2500\n"
+        for exterior in ("live depth 1", "sleep"):
+            self.broken(lines, "34[45]", CULL_BLOCK.replace("live depth 1", exterior))
+
+    def test_a_force_that_is_no_number(self):
+        for exterior in ("live depth 1", "sleep"):
+            for force in (self.NOT_A_NUMBER, self.INFINITE):
+                for ranks in (1, 2):
+                    self.broken(self.PUSH.format(force, 5), "5", CULL_BLOCK.replace("live depth 1", exterior), ranks=ranks)
+
+    def test_before_anything_is_culled(self):
+        self.broken(self.PUSH.format(self.NOT_A_NUMBER, 340), "340", before="")
+
+    def test_a_force_larger_than_a_body_can_bear(self):
+        self.broken(self.PUSH.format("1e300", 340), r"\d+", CULL_BLOCK.replace("live depth 1", "sleep"))
+
+    def lost(self, lines, cull, ranks):
+        """What is thrown out of the box is lost, and nothing else happens."""
+        text = BLOCK + "\n" + cull + "\nrun 200\n" + lines
+        run = self.accepted(text.replace("lost error", "lost ignore") + "run 200\n", ranks=ranks)
+        self.assertNotIn("internal error", run.output)
+        return text
+
+    def test_a_time_step_far_too_large(self):
+        for exterior in ("live depth 1", "sleep"):
+            for ranks in (1, 2):
+                for dt in ("1e-2", "1"):
+                    text = self.lost(f"timestep {dt}\n", CULL_BLOCK.replace("live depth 1", exterior), ranks)
+                    stopped = Run(text + "thermo 10\nrun 200\n", ranks=ranks)
+                    self.assertEqual(len(stopped.errors(stopped.screen)), 1, stopped.output[-1500:])
+                    self.assertRegex(stopped.errors(stopped.screen)[0], "^ERROR: Lost atoms: original ")
+
+    def test_granules_created_one_in_another(self):
+        lines = "create_atoms 1 single 0.0105 0.0105 0.0201 units box\nset group all diameter 0.003 density 2500\n"
+        for exterior in ("live depth 1", "sleep"):
+            for ranks in (1, 2):
+                self.lost(lines, CULL_BLOCK.replace("live depth 1", exterior), ranks)
 
 
 class InternalErrors(Case):

@@ -24,7 +24,8 @@ class SphereCells {
       hi_ = hi_.cwiseMax(s.centre);
       largest_ = std::max(largest_, s.radius);
     }
-    const Vec3 extent = hi_ - lo_;
+    Vec3 extent = hi_ - lo_;
+    if (!extent.allFinite()) extent = Vec3::Zero();  // one cell
     do {
       inverse_ = 1.0 / cell;
       for (int d = 0; d < 3; ++d) n_[d] = static_cast<int>(std::min(1e6, extent[d] * inverse_)) + 1;
@@ -63,7 +64,7 @@ class SphereCells {
     const Vec3 reach = Vec3::Constant(s.radius + gap + largest_);
     return !for_each_in_box(s.centre - reach, s.centre + reach, [&](std::size_t index, const Sphere& other) {
       const double touch = s.radius + other.radius + gap;
-      return touch <= 0 || (other.centre - s.centre).squaredNorm() >= touch * touch || !counts(index);
+      return touch <= 0 || !((other.centre - s.centre).squaredNorm() < touch * touch) || !counts(index);
     });
   }
 
@@ -75,7 +76,7 @@ class SphereCells {
     std::array<int, 3> c;
     for (int d = 0; d < 3; ++d) {
       const double x = std::floor((p[d] - lo_[d]) * inverse_);
-      c[d] = x < 0 ? 0 : x >= n_[d] ? n_[d] - 1 : static_cast<int>(x);
+      c[d] = !(x > 0) ? 0 : x >= n_[d] ? n_[d] - 1 : static_cast<int>(x);  // what is no number is somewhere, too
     }
     return c;
   }

@@ -39,9 +39,11 @@ void SphereLevels::Level::sort_into_cells(std::vector<Place>& found, double edge
   // few spheres far apart would need many cells: up to a million are cheaper than crowded ones
   const double spheres = static_cast<double>(found.size());
   const double most = std::max(4 * spheres + 64, std::min(64 * spheres, 1048576.0));
+  std::array<double, 3> extent;
+  for (int d = 0; d < 3; ++d) extent[d] = std::isfinite(hi[d] - lo[d]) ? hi[d] - lo[d] : 0;
   for (;; edge *= 1.5) {
     inverse = 1 / edge;
-    for (int d = 0; d < 3; ++d) n[d] = static_cast<int>(std::min(1e6, (hi[d] - lo[d]) * inverse)) + 1;
+    for (int d = 0; d < 3; ++d) n[d] = static_cast<int>(std::min(1e6, extent[d] * inverse)) + 1;
     if (static_cast<double>(n[0]) * n[1] * n[2] <= most) break;
   }
   const auto index = [this](const Place& p) { return row(cell(0, p.x[0]), cell(1, p.x[1])) + cell(2, p.x[2]); };

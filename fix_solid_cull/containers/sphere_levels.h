@@ -59,7 +59,7 @@ class SphereLevels {
 
     int cell(int d, double x) const {
       const double c = (x - lo[d]) * inverse;
-      return c < 0 ? 0 : c >= n[d] ? n[d] - 1 : static_cast<int>(c);
+      return !(c > 0) ? 0 : c >= n[d] ? n[d] - 1 : static_cast<int>(c);  // what is no number is somewhere, too
     }
     std::size_t row(int i, int j) const { return (static_cast<std::size_t>(i) * n[1] + j) * n[2]; }
     void sort_into_cells(std::vector<Place>& found, double edge);

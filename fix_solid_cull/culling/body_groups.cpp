@@ -190,7 +190,8 @@ void BodyGroups::settle() {
     if (found == wholes.end()) continue;
     const Whole& whole = found->second;
     solid_.ground(number, whole.grounded && whole.held);
-    body.settle_as_part(whole.parts, SolidBody::free_axes(tied_[group.key]), group.shift, whole.grounded_of_itself / whole.mass);
+    body.settle_as_part(whole.parts, SolidBody::free_axes(tied_.at(group.key)), group.shift,
+                        whole.grounded_of_itself / whole.mass);
   }
 }
 

@@ -1,10 +1,21 @@
 #include "body_motion.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "numbers.h"
 #include "release.h"
+#include "run_failure.h"
 
 namespace solidcull {
+
+namespace {
+
+bool moves_by_numbers(const SolidBody& b) {
+  return std::isfinite(b.pose.origin().sum() + b.pose.quaternion().coeffs().sum() + b.twist.velocity.sum() + b.twist.spin.sum());
+}
+
+}  // namespace
 
 void BodyMotion::refresh() {
   if (!stale_) return;
@@ -73,20 +84,22 @@ inline void BodyMotion::add_to_body(std::size_t k, const Vec3& contact, const Ve
 
 void BodyMotion::take_loads() {
   largest_excess_ = 0;
-  const bool moves = scales_.rigid();
+  const bool moves = scales_.rigid(), turns = ports_.contacts.turn_granules;
   const Vec3 g = ports_.run.gravity();
   const WakeUpLaw& law = scales_.wake_up();
   Atoms& atoms = ports_.atoms;
   for (ActiveBody& a : active_) a.force = a.torque = a.change = Vec3::Zero();
   for (std::size_t k = 0; k < atoms_.size(); ++k) {
     const int i = atoms_[k];
-    const Vec3 in_world = atoms.force(i);
+    const Vec3 in_world = atoms.force(i), torque = vec(atoms.torque + 3 * std::size_t(i));
+    if (!std::isfinite(in_world.sum() + torque.sum())) is_no_number(atoms.tag[i], "load", in_world);
     ActiveBody& a = active_[slot_[k]];
-    if (moves && !a.stands) add_to_body(k, in_world - atoms.mass[i] * g, vec(atoms.torque + 3 * std::size_t(i)));
+    if (moves && !a.stands) add_to_body(k, in_world - atoms.mass[i] * g, turns ? torque : Vec3(Vec3::Zero()));
     if (a.stands) a.change += in_world - atoms.mass[i] * g;
     const double tolerance = law.tolerance(atoms.mass[i], shell_[i].normal_load);
     largest_excess_ = std::max(largest_excess_, shell_.take_load(i, a.body->pose.turned_to_frame(in_world), tolerance));
-    atoms.clear_load(i);
+    atoms.clear_force(i);
+    if (turns) atoms.clear_torque(i);  // else what walls turn is the granule alone: the engine's integrator sees to that
   }
   if (scales_.sleeping())
     for (ActiveBody& a : active_)
@@ -140,7 +153,18 @@ void BodyMotion::kick_and_drift() {
       b.shift(shift);
     }
     b.take_twist();
+    if (!moves_by_numbers(b)) stop_at(a);
   }
+}
+
+/// A load too large for its time step has taken the body out of all numbers.
+void BodyMotion::stop_at(const ActiveBody& a) const {
+  const auto at = std::find_if(atoms_.begin(), atoms_.end(), [&](int i) { return shell_[i].body == a.number; });
+  if (at == atoms_.end())
+    throw RunFailure("the motion of solid body " + std::to_string(a.number) + " is no number: take a smaller timestep");
+  const Twist& t = a.body->twist;
+  const bool goes = std::isfinite(t.velocity.sum());
+  is_no_number(ports_.atoms.tag[*at], goes ? "spin" : "velocity", goes ? t.spin : t.velocity);
 }
 
 void BodyMotion::kick() {
@@ -192,13 +216,13 @@ void BodyMotion::place() {
     const Vec3 x = b.pose.to_world(place_[k]);
     atoms.set_place(i, periodic ? solid_.nearest_image(x, atoms.place(i)) : x);
     atoms.set_velocity(i, of[slot_[k]].at(place_[k]));
-    atoms.set_spin(i, b.twist.spin);
+    if (ports_.contacts.turn_granules) atoms.set_spin(i, b.twist.spin);
   }
 }
 
 void BodyMotion::give_velocity(std::size_t k, const std::vector<FieldInFrame>& of) {
   ports_.atoms.set_velocity(atoms_[k], of[slot_[k]].at(place_[k]));
-  ports_.atoms.set_spin(atoms_[k], active_[slot_[k]].body->twist.spin);
+  if (ports_.contacts.turn_granules) ports_.atoms.set_spin(atoms_[k], active_[slot_[k]].body->twist.spin);
 }
 
 void BodyMotion::give_velocities_to_riders() {

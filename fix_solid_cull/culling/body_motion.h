@@ -72,6 +72,7 @@ class BodyMotion : public BodyFollower {
   void give_velocity(std::size_t k, const std::vector<FieldInFrame>& of);
   void add_to_body(std::size_t k, const Vec3& contact, const Vec3& torque);
   void sum_over_ranks();
+  [[noreturn]] void stop_at(const ActiveBody& a) const;
   double way_in_a_step(const ActiveBody& a) const;
 
   const Ports& ports_;

@@ -58,11 +58,15 @@ void Cover::begin_run(bool a_wall_has_gone) {
 
 void Cover::plug(const WallContact& c, const Vec3& at, const Vec3& outward, FlatMap<Sphere>& moving) {
   const double radius = 0.5 * (scales_.depth() + scales_.closing()) + scales_.diameter();
+  constexpr int bits = 19;  // of a place along an axis; what is 2^18 diameters away may have the same
   const auto grid = [&](double x) {
-    return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(x / (0.5 * scales_.diameter())))) & 0xfffff;
+    const auto cell = static_cast<std::int64_t>(std::floor(x / (0.5 * scales_.diameter())));
+    return static_cast<std::uint64_t>(cell) & ((std::uint64_t{1} << bits) - 1);
   };
-  const std::uint64_t side = (outward[0] > 0.5) + 2 * (outward[0] < -0.5) + 3 * (outward[1] > 0.5) + 6 * (outward[1] < -0.5);
-  const std::int64_t place = static_cast<std::int64_t>(((grid(at[0]) << 20 | grid(at[1])) << 20 | grid(at[2])) << 4 | side);
+  // a thin plate has one on either side
+  std::uint64_t side = 0;
+  for (int d = 0; d < 3; ++d) side = 3 * side + (outward[d] > 0.5 ? 1 : outward[d] < -0.5 ? 2 : 0);
+  const std::int64_t place = static_cast<std::int64_t>(((grid(at[0]) << bits | grid(at[1])) << bits | grid(at[2])) << 5 | side);
   const Sphere plug{at + radius * outward, radius};
   if (c.moving) {
     const Sphere* before = moving_plugs_.find(place);

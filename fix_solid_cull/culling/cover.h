@@ -67,6 +67,7 @@ class Cover : public BodyFollower {
   /// Asks for interface granules to wake that have lost too much of their cover. Local.
   void wake_exposed();
 
+  std::size_t plugs() const { return plugs_.size() + moving_plugs_.size(); }
   const Pose& observer() const { return observer_; }
   const Pose& observed_then() const { return observed_then_; }
   void set_observer(const Pose& observer, const Pose& observed_then) {

@@ -8,6 +8,7 @@
 
 #include "body_changes.h"
 #include "input_error.h"
+#include "numbers.h"
 
 namespace solidcull {
 namespace {
@@ -33,6 +34,11 @@ void Culling::begin_run() {
     throw InputError("the contact model's history has changed from " + std::to_string(p_.solid.contacts().width()) + " to " +
                      std::to_string(flips.size()) + " numbers while granules are culled: unfix " + p_.ports.run.name +
                      " before the pair_style changes");
+  if (!p_.solid.set_granules_turn(p_.ports.contacts.turn_granules))
+    throw InputError(
+        "the contact model has, or had, neither friction nor rolling friction, and changes while granules are culled: "
+        "unfix " +
+        p_.ports.run.name + " before the pair_style changes");
   p_.ports.ranks.update();
   Vec3 periods = p_.ports.run.edges();
   for (int d = 0; d < 3; ++d)
@@ -83,6 +89,7 @@ void Culling::find_scales() {
 void Culling::set_up_atoms() {
   expect({Phase::beginning}, "set_up_atoms");
   if (p_.shown.shown()) return;  // no run: a command of the deck sets up what it needs
+  check_numbers(p_.ports.atoms);
   find_scales();
   if (!p_.solid.has_store()) return;
   // a restart file keeps groups: marks of granules that this fix does not hold would hide their contacts
@@ -149,7 +156,7 @@ void Culling::take_neighbours() {
 
 /// Interface granules may have come from other ranks, or left the box.
 void Culling::take_arrivals() {
-  p_.handover.take_over();
+  p_.lost.add(p_.handover.take_over());
   if (p_.lost.forget_lost()) settle_bodies();
   p_.groups.share();
 }
@@ -286,6 +293,7 @@ void Culling::see_walls(bool new_run) {
 void Culling::look() {
   const auto timed = p_.report.time(Part::look);
   const std::int64_t step = p_.ports.run.step;
+  check_numbers(p_.ports.atoms);
   const bool any_culled = p_.ports.ranks.any(!p_.motion.interface_atoms().empty() || p_.solid.store().size() > 0);
   p_.gravity.watch();
   std::int64_t in_bodies[2] = {0, static_cast<std::int64_t>(p_.solid.locked())};
@@ -383,6 +391,7 @@ void Culling::judge(bool may_cull, const Proposal& proposal) {
 // ------------------------------------------------------------------------------------------------------- a membership change
 
 void Culling::change() {
+  check_numbers(p_.ports.atoms);  // before they are sorted into cells, here and by the engine
   if (!p_.solid.has_store()) return;
   const auto timed = p_.report.time(Part::membership);
   if (p_.ports.ranks.any(p_.ports.ranks.subdomain_changed())) {

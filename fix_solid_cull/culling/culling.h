@@ -13,7 +13,7 @@
 namespace solidcull {
 
 /// Called by the adapter in the engine's hooks, in the order of a time step. All are collective unless they say otherwise.
-/// InputError: the user's fault, on all ranks alike; any other exception: ours.
+/// InputError: the user's fault, on all ranks alike; RunFailure: the run's, on any rank; any other exception: ours.
 class Culling {
  public:
   Culling(const Ports& ports, const Settings& settings, int types) : p_(ports, settings, types) {}

@@ -18,6 +18,12 @@ struct Arrival {
 };
 using Arrivals = FlatMap<Arrival>;
 
+/// One that the engine does not have any more, and its body has still; in the frame of that.
+struct LostGranule {
+  std::int64_t tag;
+  GranuleMass granule;
+};
+
 /// Local.
 class GranuleMasses {
  public:

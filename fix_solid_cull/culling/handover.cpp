@@ -45,8 +45,10 @@ bool Handover::send_home() {
   arrivals_.clear();
   if (ports_.ranks.count == 1) return false;
   std::vector<std::int64_t> atoms;
-  for (int i = 0; i < ports_.atoms.owned; ++i)
-    if (shell_[i].locked && !ports_.ranks.owns(ports_.atoms.place(i))) atoms.push_back(ports_.atoms.tag[i]);
+  for (int i = 0; i < ports_.atoms.owned; ++i) {
+    if (!shell_[i].locked || ports_.ranks.owns(ports_.atoms.place(i))) continue;
+    if (ports_.run.keeps(ports_.atoms.place(i))) atoms.push_back(ports_.atoms.tag[i]);  // else the engine drops it on the way
+  }
   std::sort(atoms.begin(), atoms.end());
   const std::vector<std::int64_t> stored = stored_elsewhere();
   if (!ports_.ranks.any(!atoms.empty() || !stored.empty())) return false;
@@ -56,7 +58,7 @@ bool Handover::send_home() {
   return true;
 }
 
-void Handover::take_over() {
+std::vector<LostGranule> Handover::take_over() {
   for (int i = 0; i < ports_.atoms.owned; ++i) {
     if (!shell_[i].locked || shell_[i].body != Locked::arriving) continue;
     const std::int64_t tag = ports_.atoms.tag[i];
@@ -66,10 +68,13 @@ void Handover::take_over() {
     shell_.label(i, groups_.key_of(a->at.body));
     arrivals_.erase(tag);
   }
-  arrivals_.for_each([&](std::int64_t tag, const Arrival&) {
-    throw InternalError("interface granule " + std::to_string(tag) + " was announced by another rank and did not come");
+  std::vector<LostGranule> lost;
+  arrivals_.for_each([&](std::int64_t tag, const Arrival& a) {
+    lost.push_back({tag, {a.mass, a.at.position, a.radius, a.held}});
   });
+  std::sort(lost.begin(), lost.end(), [](const LostGranule& a, const LostGranule& b) { return a.tag < b.tag; });
   arrivals_.clear();
+  return lost;
 }
 
 }  // namespace solidcull

@@ -25,9 +25,10 @@ class Handover : public BodyFollower {
 
   /// At the end of a membership change. True if something went. Collective.
   bool send_home();
-  /// After the engine's exchange: interface granules that have come find their bodies. std::exception for one that was not
-  /// announced, or did not come. Local.
-  void take_over();
+  /// After the engine's exchange: interface granules that have come find their bodies. Gives those that were announced and did
+  /// not come: they went farther than to the next rank, and the engine has lost them. std::exception for one that was not
+  /// announced. Local.
+  std::vector<LostGranule> take_over();
   /// Subdomains are others. Local.
   void forget_homes() { at_home_.clear(); }
 

@@ -29,7 +29,7 @@ void MembershipChange::lock(int i) {
   p_.survey.begin_anew(i);
   if (!p_.scales.rigid()) {
     atoms.set_velocity(i, Vec3::Zero());
-    atoms.set_spin(i, Vec3::Zero());
+    if (p_.ports.contacts.turn_granules) atoms.set_spin(i, Vec3::Zero());
   }
   p_.solid.count_locked();
 }
@@ -146,8 +146,9 @@ void MembershipChange::leave_body(std::int64_t tag) {
   const bool back = p_.shell[i].lock_step == p_.ports.run.step;
   const Twist twist = p_.solid.bodies().body(body).twist;
   atoms.set_velocity(i, back ? p_.shell[i].velocity : twist.at(x));
-  atoms.set_spin(i, back ? p_.shell[i].spin : twist.spin);
-  const MovingGranule given{atoms.mass[i], atoms.radius[i], x, atoms.velocity(i), atoms.spin(i)};
+  if (p_.ports.contacts.turn_granules) atoms.set_spin(i, back ? p_.shell[i].spin : twist.spin);
+  const double radius = p_.solid.bodies().turning_radius(atoms.radius[i]);
+  const MovingGranule given{atoms.mass[i], radius, x, atoms.velocity(i), atoms.spin(i)};
   const double before = p_.solid.kinetic_energy(body);
   p_.solid.unlock(tag, p_.masses(tag), back && p_.scales.rigid() ? &given : nullptr);
   const double after = p_.solid.kinetic_energy(body) +

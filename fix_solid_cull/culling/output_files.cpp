@@ -34,7 +34,7 @@ void OutputFiles::on_root(const char* keyword, Write write) {
       failure = e.what();
     }
   if (ports_.ranks.any(!failure.empty()))
-    throw InputError("keyword '" + std::string(keyword) + "': " + failure + "; nothing of the run is lost but it stops here");
+    throw InputError("keyword '" + std::string(keyword) + "': " + failure + "; write it elsewhere, or leave the keyword out");
 }
 
 // ------------------------------------------------------------------------------------------------------------ meshes

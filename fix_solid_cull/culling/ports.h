@@ -56,9 +56,11 @@ class Atoms {
   void set_place(int i, const Vec3& to) { set(x + 3 * std::size_t(i), to); }
   void set_velocity(int i, const Vec3& to) { set(v + 3 * std::size_t(i), to); }
   void set_spin(int i, const Vec3& to) { set(omega + 3 * std::size_t(i), to); }
+  void clear_force(int i) { set(f + 3 * std::size_t(i), Vec3::Zero()); }
+  void clear_torque(int i) { set(torque + 3 * std::size_t(i), Vec3::Zero()); }
   void clear_load(int i) {
-    set(f + 3 * std::size_t(i), Vec3::Zero());
-    set(torque + 3 * std::size_t(i), Vec3::Zero());
+    clear_force(i);
+    clear_torque(i);
   }
   Sphere sphere(int i) const { return {place(i), radius[i]}; }
   bool is_interface(int i) const { return (groups[i] & interface_bit) != 0; }
@@ -71,8 +73,9 @@ class Atoms {
 
   /// Everything that the engine keeps of owned granule i, as doubles; `layout`: the number of its columns' layout.
   virtual void pack(int i, std::vector<double>& record, int& layout) = 0;
-  /// Which numbers of a record are position (where `positions`), velocity and spin; found by trying them on owned granule i.
-  virtual std::vector<int> motion_words(int i, bool positions) = 0;
+  /// Which numbers of a record are position (where `positions`), velocity and spin (where `spins`); found by trying them on owned
+  /// granule i.
+  virtual std::vector<int> motion_words(int i, bool positions, bool spins) = 0;
   /// Deletes owned granule i; the last owned granule takes its index. Only while membership changes.
   virtual void take_out(int i) = 0;
   /// A granule from its record; returns its index. Only while membership changes.
@@ -138,6 +141,9 @@ class Contacts {
 
   /// Two granules closer than this times the sum of their radii bear on each other (above 1 with cohesion).
   double reach_factor = 1;
+  /// Contacts between granules turn them, by friction or rolling friction. Where none does, a granule's spin is its own: no body
+  /// turns it, and it turns no body.
+  bool turn_granules = true;
 
   virtual NeighbourRows neighbours() const = 0;   ///< valid until the next neighbour build
   virtual HistoryRows histories() const = 0;      ///< valid between pre_exchange and the next neighbour build
@@ -162,7 +168,7 @@ class Contacts {
   virtual void leave_out_pairs_within(const std::vector<int>& body_of_atom) = 0;
 };
 
-/// An owned granule within the skin of a wall.
+/// An owned granule within the skin of a wall, or, where a mesh stands still, within half of it.
 struct WallContact {
   int granule;   ///< index of the owned atom
   Vec3 to_wall;  ///< from the granule's centre to the nearest point of the wall (m)
@@ -181,7 +187,7 @@ struct WallTriangle {
 class Walls {
  public:
   virtual ~Walls() = default;
-  /// All owned granules near a wall. Valid while neighbour lists are.
+  /// All owned granules near a wall, see WallContact. Valid while neighbour lists are.
   virtual std::vector<WallContact> contacts() const = 0;
   virtual std::vector<WallTriangle> triangles() const = 0;
   /// Is a sphere that is no atom closer than `gap` to the triangle, or to any wall that is no mesh?
@@ -293,6 +299,7 @@ class Run {
 
   std::int64_t deck_step() const { return step + reset_by; }
   Vec3 edges() const { return box.hi - box.lo; }
+  bool keeps(const Vec3& x) const { return (x.array() >= kept.lo.array()).all() && (x.array() < kept.hi.array()).all(); }
   bool any_periodic() const { return periodic[0] || periodic[1] || periodic[2]; }
 
   virtual Vec3 gravity() const = 0;                   ///< m/s^2, now

@@ -276,6 +276,30 @@ bool ShellClosure::may_leave_its_walls(int i) const {
          !new_run_;
 }
 
+/// Engines list what a still mesh is near to for contacts only, not as far as a body may move until somebody looks: of these
+/// atoms those stay whose body may move, and a mesh is within the skin of them.
+void ShellClosure::leave_out_near_meshes(std::vector<int>& atoms) const {
+  std::vector<Sphere> spheres;
+  std::vector<int> of;
+  for (const int i : atoms)
+    if (!solid_.stands(shell_[i].body)) {
+      spheres.push_back(ports_.atoms.sphere(i));
+      of.push_back(i);
+    }
+  if (spheres.empty()) return;
+  SphereCells cells;
+  cells.build(std::move(spheres), 2 * scales_.diameter());
+  const double skin = ports_.run.skin;
+  const Vec3 reach = Vec3::Constant(cells.largest_radius() + skin);
+  std::set<int> near;
+  for (const WallTriangle& t : ports_.walls.triangles())
+    cells.for_each_in_box(t.box.lo - reach, t.box.hi + reach, [&](std::size_t k, const Sphere& s) {
+      if (!near.count(of[k]) && ports_.walls.near(t, s, skin)) near.insert(of[k]);
+      return true;
+    });
+  atoms.erase(std::remove_if(atoms.begin(), atoms.end(), [&](int i) { return near.count(i) != 0; }), atoms.end());
+}
+
 bool ShellClosure::ask_to_store(const std::vector<int>& interface_atoms) {
   // but for those that something was near to the last time
   std::size_t may_go = 0;
@@ -399,6 +423,7 @@ std::size_t ShellClosure::store_what_is_deep(bool locked_now, bool membership_ch
     else
       deep.push_back(i);
   }
+  leave_out_near_meshes(deep);
   // where nothing else changes, a few wait for more
   if (!membership_changes && static_cast<double>(deep.size()) < store_share * ports_.atoms.owned) return 0;
   for (const int i : deep) exchange_.put_away(i);

@@ -101,6 +101,7 @@ class ShellClosure : public BodyFollower {
   void find_near_walls(std::set<std::int64_t>& near);
   void find_near_primitives(const std::vector<int>& frames, std::set<std::int64_t>& near) const;
   bool may_leave_its_walls(int i) const;
+  void leave_out_near_meshes(std::vector<int>& atoms) const;
 
   const Ports& ports_;
   const Scales& scales_;

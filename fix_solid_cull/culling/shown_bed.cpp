@@ -54,7 +54,7 @@ void ShownBed::show_interface() {
     interface_.push_back({e, atoms.velocity(i), atoms.spin(i)});
     if (e.lock_step == ports_.run.step) {  // no step has passed since: the deck sees the motion that it had
       atoms.set_velocity(i, e.velocity);
-      atoms.set_spin(i, e.spin);
+      if (ports_.contacts.turn_granules) atoms.set_spin(i, e.spin);
     }
     note(i, false, 0);
   }
@@ -67,13 +67,13 @@ void ShownBed::show_stored() {
   motion_words_.clear();
   solid_.store().for_each_record([&](const StoredGranule& g, const std::vector<double>& record, bool transient_known) {
     const int i = atoms.put_back(record, g.layout);
-    if (motion_words_.empty()) motion_words_ = atoms.motion_words(i, by_place);
+    if (motion_words_.empty()) motion_words_ = atoms.motion_words(i, by_place, ports_.contacts.turn_granules);
     if (!transient_known) {
       const SolidBody& body = solid_.bodies().body(g.body);
       const Vec3 x = body.pose.to_world(g.position);
       atoms.set_place(i, solid_.nearest_image(x, scales_.compact() ? middle : atoms.place(i)));
       atoms.set_velocity(i, body.twist.at(x));
-      atoms.set_spin(i, body.twist.spin);
+      if (ports_.contacts.turn_granules) atoms.set_spin(i, body.twist.spin);
     }
     shell_.label(i, groups_.key_of(g.body));
     note(i, true, sum_of(record));

@@ -26,7 +26,7 @@ int StoreExchange::bring_back(std::int64_t tag) {
     atoms.set_place(i, solid_.nearest_image(x, near));
   }
   atoms.set_velocity(i, body.twist.at(x));
-  atoms.set_spin(i, body.twist.spin);
+  if (ports_.contacts.turn_granules) atoms.set_spin(i, body.twist.spin);
   cover_.came_back(i, x);
   index_.set(tag, i);
   return i;
@@ -35,8 +35,9 @@ int StoreExchange::bring_back(std::int64_t tag) {
 void StoreExchange::put_away(int i) {
   const Locked& e = shell_[i];
   Atoms& atoms = ports_.atoms;
+  const bool turns = ports_.contacts.turn_granules;
   atoms.set_velocity(i, e.velocity);
-  atoms.set_spin(i, e.spin);
+  if (turns) atoms.set_spin(i, e.spin);  // else it is its own, and goes on in the store
   ports_.contacts.clear_histories(i);
   if (scales_.compact()) atoms.wrap(i);  // the box and the place tell which image: no word is kept for it
   std::vector<double> record;
@@ -62,7 +63,8 @@ void StoreExchange::put_away(int i) {
   if (walls_[i].near && scales_.sleeping()) loads = grounding_.wall_loads_on(i);
   if (stored_at_ != now) {
     stored_at_ = now;
-    motion_words_ = atoms.motion_words(i, !ports_.run.any_periodic() || scales_.compact());  // the place tells which image
+    const bool places = !ports_.run.any_periodic() || scales_.compact();  // the place tells which image
+    motion_words_ = atoms.motion_words(i, places, turns);
   }
   solid_.put_away(g, record, motion_words_, loads);
   index_.erase(g.tag);

@@ -177,9 +177,12 @@ std::int64_t Survey::find_calm(const Patience& patience, Proposal& proposal) {
 void Survey::join_bodies(const Seen& seen, int looks, Proposal& proposal) {
   const Atoms& atoms = ports_.atoms;
   const int owned = atoms.owned;
+  std::vector<char> rests(static_cast<std::size_t>(owned), 0);  // against another body, once however many it touches
   for (const Pair& p : seen.between_bodies)
     for (const int end : {p.i, p.j})
-      if (end < owned) rows_[end].calm = seen.moving[end] ? 0 : rows_[end].calm + 1;
+      if (end < owned) rests[end] = !seen.moving[end];
+  for (int i = 0; i < owned; ++i)
+    if (shell_[i].locked) rows_[i].calm = rests[i] ? rows_[i].calm + 1 : 0;
   for (const Pair& p : seen.between_bodies) {
     const bool long_enough = rows_[p.i].calm >= looks && (p.j >= owned || rows_[p.j].calm >= looks);
     if (!long_enough || seen.moving[p.i] || (p.j < owned && seen.moving[p.j])) continue;

@@ -23,7 +23,7 @@ class EngineAtoms : public Atoms, protected LAMMPS_NS::Pointers {
   bool make_interface_group();
 
   void pack(int i, std::vector<double>& record, int& layout) override { records_.pack(i, record, layout); }
-  std::vector<int> motion_words(int i, bool positions) override { return records_.motion_words(i, positions); }
+  std::vector<int> motion_words(int i, bool positions, bool spins) override { return records_.motion_words(i, positions, spins); }
   void take_out(int i) override;
   int put_back(const std::vector<double>& record, int layout) override;
   void wrap(int i) override;

@@ -1,6 +1,7 @@
 #include "contacts.h"
 
 #include <algorithm>
+#include <cstdint>
 
 #include "atom.h"
 #include "deck_commands.h"
@@ -10,6 +11,20 @@
 #include "pair_gran.h"
 
 namespace solidcull {
+namespace {
+
+constexpr int last_cohesion_without_torque = 2;  // sjkr2; capillary bridges drag on surfaces
+
+}  // namespace
+
+void EngineContacts::connect() {
+  histories_.connect();
+  // a contact model is five numbers of six bits: normal, tangential, cohesion, rolling, surface; 0 is off
+  const auto model = static_cast<std::uint64_t>(static_cast<LAMMPS_NS::PairGran*>(force->pair)->hashcode());
+  const auto part = [model](int n) { return static_cast<int>(model >> 6 * n & 63); };
+  const int tangential = part(1), cohesion = part(2), rolling = part(3);
+  turn_granules = tangential != 0 || rolling != 0 || cohesion > last_cohesion_without_torque;
+}
 
 void EngineContacts::renew() { reach_factor = neighbor->contactDistanceFactor; }
 

@@ -15,7 +15,7 @@ class EngineContacts : public Contacts, protected LAMMPS_NS::Pointers {
   explicit EngineContacts(LAMMPS_NS::LAMMPS* lmp) : Pointers(lmp), histories_(lmp), pair_force_(lmp) {}
 
   /// A run begins: the pair style may be another. Local.
-  void connect() { histories_.connect(); }
+  void connect();
   void renew();  ///< at each hook. Local
   void release_memory() { pair_force_.release(); }
 

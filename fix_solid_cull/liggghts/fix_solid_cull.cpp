@@ -4,6 +4,8 @@
 #include <cerrno>
 #include <cstring>
 #include <exception>
+#include <new>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -12,6 +14,7 @@
 #include "error.h"
 #include "input_error.h"
 #include "interpositions.h"
+#include "run_failure.h"
 #include "settings.h"
 #include "update.h"
 
@@ -82,8 +85,11 @@ void FixSolidCull::refuse(const std::string& why) {
 }
 
 void FixSolidCull::broken(const std::string& what) {
-  fail("internal error on rank " + std::to_string(comm->me) + " at step " + std::to_string(update->ntimestep) + ": " + what +
-       "; please report it with the deck");
+  fail("internal error " + where() + ": " + what + "; please report it with the deck");
+}
+
+std::string FixSolidCull::where() const {
+  return "on rank " + std::to_string(comm->me) + " at step " + std::to_string(update->ntimestep);
 }
 
 void FixSolidCull::fail(const std::string& why) {
@@ -105,10 +111,18 @@ auto FixSolidCull::guarded(Work work) -> decltype(work()) {
     return work();
   } catch (const InputError& e) {
     refuse(e.what());
+  } catch (const RunFailure& e) {
+    fail(where() + ": " + e.what());
+  } catch (const std::range_error& e) {  // more than a container can hold
+    fail(where() + ": " + e.what());
+  } catch (const std::length_error& e) {
+    fail(where() + ": " + e.what());
+  } catch (const std::bad_alloc&) {
+    fail(where() + ": no more memory; use more ranks, or store compact");
   } catch (const std::exception& e) {
     broken(e.what());
   }
-  std::abort();  // both end the program
+  std::abort();  // all of these end the program
 }
 
 template <class Work>

@@ -88,6 +88,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void refuse(const std::string& why);   // the user's fault; collective
   void broken(const std::string& what);  // ours; local
   void fail(const std::string& why);     // ends the run; local
+  std::string where() const;             // rank and step
   void publish_flags();
 
   EngineAtoms atoms_;

@@ -84,7 +84,7 @@ bool GranuleRecords::is_last_layout() const {
   return true;
 }
 
-std::vector<int> GranuleRecords::motion_words(int i, bool positions) {
+std::vector<int> GranuleRecords::motion_words(int i, bool positions, bool spins) {
   std::vector<double> before(longest_column), after(longest_column);
   AtomStyleOnly guard(atom);
   const int length = atom->avec->pack_exchange(i, before.data());
@@ -92,7 +92,7 @@ std::vector<int> GranuleRecords::motion_words(int i, bool positions) {
   for (int d = 0; d < 3; ++d) {
     if (positions) state.push_back(&atom->x[i][d]);
     state.push_back(&atom->v[i][d]);
-    state.push_back(&atom->omega[i][d]);
+    if (spins) state.push_back(&atom->omega[i][d]);
   }
   std::vector<int> words;
   for (double* number : state) {

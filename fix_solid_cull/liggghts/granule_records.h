@@ -20,7 +20,7 @@ class GranuleRecords : protected LAMMPS_NS::Pointers {
   void pack(int i, std::vector<double>& record, int& layout);
   /// Which numbers of a record are position, velocity and spin (position only where `positions`), by trying them on owned granule
   /// i.
-  std::vector<int> motion_words(int i, bool positions);
+  std::vector<int> motion_words(int i, bool positions, bool spins);
   /// Deletes owned granule i; the last owned granule takes its index.
   void remove(int i);
   /// Appends a granule from its record and returns its index. Fixes that were not there when it was packed set their defaults.

@@ -37,6 +37,19 @@ WallTriangle triangle(TriMesh* mesh, int number, int index) {
   return t;
 }
 
+/// On the axis of a cylinder the engine says 0, whatever the radii: asked a little beside it.
+double gap_to(LAMMPS_NS::PrimitiveWall& wall, const double* place, double radius, double* to_wall) {
+  constexpr double beside = 1e-7;  // m; the engine takes 1e-8 for nothing
+  double x[3] = {place[0], place[1], place[2]};
+  const double gap = wall.resolveContact(x, radius, to_wall);
+  const int axis = wall.axis();
+  const bool on_axis = gap == 0 && axis >= 0 && to_wall[0] == 0 && to_wall[1] == 0 && to_wall[2] == 0;
+  if (!on_axis) return gap;
+  x[(axis + 1) % 3] += beside;
+  const double gap_beside = wall.resolveContact(x, radius, to_wall);
+  return gap_beside + beside;
+}
+
 }  // namespace
 
 void WallContacts::connect() {
@@ -61,7 +74,7 @@ std::vector<WallContact> WallContacts::find() const {
       for (int k = 0; k < n; ++k) {
         const int i = list[k];
         if (i >= owned || !(mask[i] & wall->groupbit)) continue;
-        const double gap = wall->primitiveWall()->resolveContact(atom->x[i], atom->radius[i], to_wall);
+        const double gap = gap_to(*wall->primitiveWall(), atom->x[i], atom->radius[i], to_wall);
         if (gap < skin) found.push_back({i, Vec3(to_wall[0], to_wall[1], to_wall[2]), gap, wall->is_moving() != 0});
       }
       continue;
@@ -84,9 +97,9 @@ std::vector<WallContact> WallContacts::find() const {
 }
 
 bool WallContacts::primitive_near(const Sphere& s, double gap) const {
-  double x[3] = {s.centre[0], s.centre[1], s.centre[2]}, to_wall[3];
+  double to_wall[3];
   return std::any_of(walls_.begin(), walls_.end(), [&](FixWallGran* wall) {
-    return !wall->is_mesh_wall() && wall->primitiveWall()->resolveContact(x, s.radius, to_wall) < gap;
+    return !wall->is_mesh_wall() && gap_to(*wall->primitiveWall(), s.centre.data(), s.radius, to_wall) < gap;
   });
 }
 

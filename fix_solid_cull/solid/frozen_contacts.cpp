@@ -43,7 +43,8 @@ std::uint32_t FrozenContacts::link(std::int64_t tag, std::int64_t partner) {
   const std::int32_t low = narrow_tag(std::min(tag, partner)), high = narrow_tag(std::max(tag, partner));
   std::uint32_t e = first_free_;
   if (e == none) {
-    if (edges_.size() >= none) throw std::logic_error("more than 2^31 - 1 frozen contacts on one rank");
+    if (edges_.size() >= none)
+      throw std::length_error("a rank holds 2^31 - 1 contacts of culled granules, the most that it can: use more ranks");
     e = static_cast<std::uint32_t>(edges_.append());
     if (width()) histories_.append();
   } else {

@@ -6,14 +6,14 @@
 namespace solidcull {
 
 void FrozenWallLoads::book(int body, const WallLoad& load, int sign) {
-  Elements& elements = bodies_[body];
+  Elements& elements = sign > 0 ? bodies_[body] : bodies_.at(body);  // what is taken away must have been there
   book(elements, load, sign);
   if (elements.empty()) bodies_.erase(body);
   book(all_, load, sign);
 }
 
 void FrozenWallLoads::book(Elements& elements, const WallLoad& load, int sign) {
-  Element& e = elements[{load.mesh, load.element}];
+  Element& e = sign > 0 ? elements[{load.mesh, load.element}] : elements.at({load.mesh, load.element});
   e.granules += sign;
   e.force += sign * load.force;
   e.torque += sign * load.torque;

@@ -424,7 +424,7 @@ void GranuleStore::rebuild_index(std::size_t entries) {
   const std::size_t most = std::max(entries, slots_.size()) + 1;
   slot_bits_ = 0;
   while (most >> slot_bits_) ++slot_bits_;
-  if (slot_bits_ > 31) throw std::logic_error("the granule store of one rank is full");
+  if (slot_bits_ > 31) throw std::length_error("the granule store of a rank is full: use more ranks");
   index_.assign(entries, empty_entry);
   index_.shrink_to_fit();
   const std::size_t n = index_.size();

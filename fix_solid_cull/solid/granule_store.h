@@ -243,14 +243,15 @@ class GranuleStore {
   }
   bool surely_far(const Grid& grid, const Sphere& s, double gap) const {
     const double reach = s.radius + gap + largest_radius_;
-    if (((s.centre - grid.box.hi).array() > reach).any() || ((grid.box.lo - s.centre).array() > reach).any()) return true;
+    if (!(((s.centre - grid.box.hi).array() <= reach).all() && ((grid.box.lo - s.centre).array() <= reach).all())) return true;
     if (reach > 1.0 / inverse_cell_) return false;
     const auto c = cell_of(s.centre);
     return !grid.cells.contains(key(c[0], c[1], c[2]));
   }
   template <class Visit>
   void for_each_slot_in_box(const Grid& grid, const Vec3& lo, const Vec3& hi, Visit visit) const {
-    if ((lo.array() > grid.box.hi.array()).any() || (hi.array() < grid.box.lo.array()).any()) return;
+    // nor is anything in a box whose corners are no numbers
+    if (!((lo.array() <= grid.box.hi.array()).all() && (hi.array() >= grid.box.lo.array()).all())) return;
     const auto a = cell_of(lo.cwiseMax(grid.box.lo)), b = cell_of(hi.cwiseMin(grid.box.hi));
     double cells = 1;
     for (int d = 0; d < 3; ++d) {

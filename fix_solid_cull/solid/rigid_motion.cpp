@@ -1,8 +1,24 @@
 #include "rigid_motion.h"
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 
 namespace solidcull {
+namespace {
+
+/// About an axis on which all of it lies nothing turns, as where granules are points to their body.
+Eigen::Matrix3d inverse_of(const Eigen::Matrix3d& inertia) {
+  constexpr double none = 1e-12;
+  const double size = inertia.trace();
+  if (inertia.determinant() > none * size * size * size) return inertia.inverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(inertia);
+  Vec3 inverse = Vec3::Zero();
+  for (int d = 0; d < 3; ++d)
+    if (axes.eigenvalues()[d] > none * size) inverse[d] = 1 / axes.eigenvalues()[d];
+  return axes.eigenvectors() * inverse.asDiagonal() * axes.eigenvectors().transpose();
+}
+
+}  // namespace
 
 Eigen::Quaterniond rotation(const Vec3& angle) {
   const double half = 0.5 * angle.norm();
@@ -36,10 +52,10 @@ RigidMotion::RigidMotion(const RigidPart* parts, int count, const FreeAxes& free
     angular_momentum_ += parts[p].inertia * parts[p].spin + parts[p].mass * arm.cross(parts[p].velocity - velocity_);
   }
   if (all_free_) {
-    inverse_inertia_ = inertia.inverse();
+    inverse_inertia_ = inverse_of(inertia);
     return;
   }
-  for (int d = 0; d < 3; ++d) inverse_inertia_(d, d) = free_[d] ? 1.0 / inertia(d, d) : 0.0;
+  for (int d = 0; d < 3; ++d) inverse_inertia_(d, d) = free_[d] && inertia(d, d) > 0 ? 1.0 / inertia(d, d) : 0.0;
   keep_free_axes();
 }
 

@@ -29,6 +29,12 @@ bool Solid::set_histories(const std::vector<bool>& flips, const std::vector<int>
   return true;
 }
 
+bool Solid::set_granules_turn(bool on) {
+  if (on != bodies_.granules_turn() && has_store() && locked() > 0) return false;
+  bodies_.set_granules_turn(on);
+  return true;
+}
+
 void Solid::know_radius(int type, double radius) {
   double& largest = largest_radius_by_type_[static_cast<std::size_t>(type)];
   largest = std::max(largest, radius);
@@ -131,7 +137,7 @@ void Solid::ground(int body, bool on) {
 }
 
 void Solid::reframe_one(int body, const GranuleMass& in_world) {
-  bodies_.body(body).reframe_one(in_world);
+  bodies_.body(body).reframe_one({in_world.mass, in_world.position, bodies_.turning_radius(in_world.radius), in_world.held});
   tell([&](BodyFollower& f) { f.frame_changed(body); });
 }
 

@@ -50,6 +50,8 @@ class Solid {
   /// Layout of the contact histories: which change sign with the side, which are vectors. False, and nothing happens, if another
   /// layout is in use.
   bool set_histories(const std::vector<bool>& flips, const std::vector<int>& vectors);
+  /// Whether contacts turn granules. False, and nothing happens, if it was otherwise and granules are locked.
+  bool set_granules_turn(bool on);
   /// A granule of this type and size is stored, or will be.
   void know_radius(int type, double radius);
   void set_types(int types) { largest_radius_by_type_.assign(static_cast<std::size_t>(types) + 1, 0.0); }

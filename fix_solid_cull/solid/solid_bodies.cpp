@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
+#include "internal_error.h"
 #include "parts_that_came_off.h"
 
 namespace solidcull {
@@ -108,7 +110,7 @@ int SolidBodies::body_of(std::int64_t tag) const {
 
 const Pose& SolidBodies::pose(int number) const {
   const auto gone = swallowed_.find(number);
-  return gone == swallowed_.end() ? bodies_.at(number).pose : gone->second;
+  return gone == swallowed_.end() ? body(number).pose : gone->second;
 }
 
 Vec3 SolidBodies::to_image_of(const Vec3& there) const {
@@ -118,17 +120,20 @@ Vec3 SolidBodies::to_image_of(const Vec3& there) const {
   return shift;
 }
 
-int SolidBodies::found() {
+int SolidBodies::found() { return found(SolidBody()); }
+
+int SolidBodies::found(const SolidBody& body) {
   const int number = static_cast<int>(parent_.size());
   parent_.push_back(number);
-  bodies_[number];
+  bodies_.emplace(number, body);
   return number;
 }
 
-int SolidBodies::found(const SolidBody& body) {
-  const int number = found();
-  bodies_[number] = body;
-  return number;
+/// Asking for a body that is not there must not found one without mass.
+const SolidBody& SolidBodies::body(int number) const {
+  const auto living = bodies_.find(number);
+  if (living == bodies_.end()) throw InternalError("there is no solid body " + std::to_string(number));
+  return living->second;
 }
 
 /// The mean acceleration is that of the centre of mass: where the centre is another one now, the velocity that it began with is
@@ -158,12 +163,12 @@ void SolidBodies::add(SolidBody& body, const RigidPart& part) {
 
 int SolidBodies::merge(int a, int b, Vec3 shift) {
   // the larger body keeps its number, so that colours in pictures stay
-  if (bodies_[a].mass.count < bodies_[b].mass.count || (bodies_[a].mass.count == bodies_[b].mass.count && a > b)) {
+  if (body(a).mass.count < body(b).mass.count || (body(a).mass.count == body(b).mass.count && a > b)) {
     std::swap(a, b);
     shift = -shift;
   }
-  SolidBody& kept = bodies_[a];
-  SolidBody& gone = bodies_[b];
+  SolidBody& kept = body(a);
+  SolidBody& gone = body(b);
   if (!shift.isZero(0)) {
     gone.pose.shift(shift);
     gone.twist.point += shift;
@@ -192,7 +197,7 @@ int SolidBodies::tie(int a, Vec3& position_in_a, int b, const Vec3& position_in_
   const Vec3 shift = to_image_of(position_in_b - position_in_a);
   if (a == b) {
     for (int d = 0; d < 3; ++d)
-      if (shift[d] != 0 && !bodies_[a].spans[d]) bodies_[a].spans[d] = bodies_[a].changed = true;
+      if (shift[d] != 0 && !body(a).spans[d]) body(a).spans[d] = body(a).changed = true;
     return a;
   }
   const int kept = merge(a, b, shift);
@@ -205,11 +210,12 @@ SolidBodies::Place SolidBodies::lock(std::int64_t tag, const MovingGranule& gran
   int number = 0;
   Vec3 position = granule.position;
   const auto join = [&](int body) {
-    SolidBody& b = bodies_[body];
+    SolidBody& b = this->body(body);
     const bool first = b.mass.count == 0;
     const Vec3 before = first ? Vec3(Vec3::Zero()) : b.pose.to_world(b.mass.centre());
-    add(b, RigidPart::granule(granule.mass, granule.radius, position, granule.velocity, granule.spin));
-    b.mass.add(granule.mass, b.pose.to_frame(position), granule.radius, 1, granule.held);
+    const double radius = turning_radius(granule.radius);
+    add(b, RigidPart::granule(granule.mass, radius, position, granule.velocity, granule.spin));
+    b.mass.add(granule.mass, b.pose.to_frame(position), radius, 1, granule.held);
     b.summed = std::max(b.summed, b.mass.count);
     if (!first) centre_moved(b, before);
     member_[narrow_tag(tag)] = number = body;
@@ -218,7 +224,7 @@ SolidBodies::Place SolidBodies::lock(std::int64_t tag, const MovingGranule& gran
     const int theirs = body_of(partner);
     if (!theirs) return;
     if (number == theirs && (periods_.array() == 0).all()) return;
-    const Vec3 there = bodies_[theirs].pose.to_world(mass_of(partner).position);
+    const Vec3 there = body(theirs).pose.to_world(mass_of(partner).position);
     if (!number) {
       position -= to_image_of(there - position);
       join(theirs);
@@ -227,14 +233,14 @@ SolidBodies::Place SolidBodies::lock(std::int64_t tag, const MovingGranule& gran
     }
   });
   if (!number) join(found());
-  return {number, bodies_[number].pose.to_frame(position)};
+  return {number, body(number).pose.to_frame(position)};
 }
 
 void SolidBodies::join(std::int64_t a, std::int64_t b, const MassOf& mass_of) {
   const int of_a = body_of(a), of_b = body_of(b);
   if (!of_a || !of_b) return;
-  Vec3 in_a = bodies_[of_a].pose.to_world(mass_of(a).position);
-  tie(of_a, in_a, of_b, bodies_[of_b].pose.to_world(mass_of(b).position));
+  Vec3 in_a = body(of_a).pose.to_world(mass_of(a).position);
+  tie(of_a, in_a, of_b, body(of_b).pose.to_world(mass_of(b).position));
 }
 
 void SolidBodies::unlock(std::int64_t tag, const GranuleMass& granule, const FrozenContacts& contacts,
@@ -243,10 +249,10 @@ void SolidBodies::unlock(std::int64_t tag, const GranuleMass& granule, const Fro
   if (!number) return;
   member_.erase(narrow_tag(tag));
   contacts.for_each_partner(tag, [&](std::int64_t partner) { cut_.push_back(partner); });
-  SolidBody& body = bodies_[number];
+  SolidBody& body = this->body(number);
   body.changed = true;
   const Vec3 before = body.pose.to_world(body.mass.centre());
-  body.mass.add(granule.mass, granule.position, granule.radius, -1, granule.held);
+  body.mass.add(granule.mass, granule.position, turning_radius(granule.radius), -1, granule.held);
   if (body.mass.count == 0) {
     bodies_.erase(number);
     return;
@@ -257,8 +263,8 @@ void SolidBodies::unlock(std::int64_t tag, const GranuleMass& granule, const Fro
   // the difference to the body's own field stays with the body
   RigidPart rest = body.part();
   const Vec3 own_velocity = body.twist.at(given->position), own_spin = body.twist.spin;
-  const RigidPart difference =
-      RigidPart::granule(given->mass, given->radius, given->position, own_velocity - given->velocity, own_spin - given->spin);
+  const RigidPart difference = RigidPart::granule(given->mass, turning_radius(given->radius), given->position,
+                                                  own_velocity - given->velocity, own_spin - given->spin);
   const Vec3 momentum = difference.mass * difference.velocity;
   const Vec3 turning = difference.angular_momentum(rest.centre);
   RigidMotion motion(&rest, 1, body.free_axes());
@@ -280,10 +286,10 @@ void SolidBodies::sum_anew(int number, std::int64_t member, const FrozenContacts
   MassProperties sum;
   for (const std::int64_t tag : reached) {
     const GranuleMass g = mass_of(tag);
-    sum.add(g.mass, g.position, g.radius, 1, g.held);
+    sum.add(g.mass, g.position, turning_radius(g.radius), 1, g.held);
   }
-  bodies_[number].mass = sum;
-  bodies_[number].summed = sum.count;
+  body(number).mass = sum;
+  body(number).summed = sum.count;
 }
 
 void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
@@ -297,14 +303,15 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
   for (auto& [body, tags] : sources) {
     std::sort(tags.begin(), tags.end());
     tags.erase(std::unique(tags.begin(), tags.end()), tags.end());
-    const bool was_grounded = bodies_[body].grounded;
-    const double grounded_mass = bodies_[body].grounded_mass, whole = bodies_[body].mass.mass;
+    const SolidBody& before = this->body(body);
+    const bool was_grounded = before.grounded;
+    const double grounded_mass = before.grounded_mass, whole = before.mass.mass;
     for (const std::vector<std::int64_t>& part : parts_that_came_off(
              tags, contacts, [&](std::int64_t tag) { return is_member(tag); },
              [&](std::int64_t tag) { return mass_of(tag).position; })) {
       const int fresh = found();
-      SolidBody& off = bodies_[fresh];
-      SolidBody& rest = bodies_[body];
+      SolidBody& off = this->body(fresh);
+      SolidBody& rest = this->body(body);
       off = rest;  // same frame, same velocity field, same load at locking
       off.mass = MassProperties();
       off.step_then = rest.step_then = -1;
@@ -313,7 +320,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       MassProperties gone;
       for (const std::int64_t tag : part) {
         const GranuleMass g = mass_of(tag);
-        gone.add(g.mass, g.position, g.radius, 1, g.held);
+        gone.add(g.mass, g.position, turning_radius(g.radius), 1, g.held);
       }
       rest.mass.add(gone, -1);
       // what was tied to its own image may hang free of it now: its places are brought together again
@@ -341,7 +348,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       }
       for (std::size_t at = 0; at < order.size(); ++at) {
         const GranuleMass g = mass_of(order[at]);
-        off.mass.add(g.mass, place[at], g.radius, 1, g.held);
+        off.mass.add(g.mass, place[at], turning_radius(g.radius), 1, g.held);
         if (int* member = member_.find(narrow_tag(order[at]))) *member = fresh;
         moved(order[at], fresh, place[at]);
       }
@@ -356,7 +363,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
     }
     for (const std::int64_t tag : tags) {
       const int left = body_of(tag);
-      const SolidBody& b = bodies_.at(left);
+      const SolidBody& b = this->body(left);
       if (2 * b.mass.count < b.summed) sum_anew(left, tag, contacts, mass_of);
     }
   }

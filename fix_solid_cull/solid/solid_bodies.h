@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "flat_map.h"
@@ -158,6 +159,13 @@ class SolidBodies {
   /// Mass and place of a locked granule, by tag, in the frame of its present body.
   using MassOf = std::function<GranuleMass(std::int64_t)>;
 
+  /// Contacts turn granules, as they do unless this says otherwise; where they do not, a granule is a point to its body. Not
+  /// while granules are locked.
+  void set_granules_turn(bool on) { granules_turn_ = on; }
+  bool granules_turn() const { return granules_turn_; }
+  /// Radius (m) with which a granule takes part in the turning of its body.
+  double turning_radius(double radius) const { return granules_turn_ ? radius : 0.0; }
+
   /// Edges of the periodic box, 0 where it is not periodic (m).
   void set_periods(const Vec3& periods) { periods_ = periods; }
   const Vec3& periods() const { return periods_; }
@@ -179,9 +187,10 @@ class SolidBodies {
 
   /// One of its granules is somewhere else in it from here on, by so little that the motion stays what it is.
   void shift(int body, const GranuleMass& granule, const Vec3& to) {
-    MassProperties& sums = bodies_.at(body).mass;
-    sums.add(granule.mass, to, granule.radius, +1, granule.held);
-    sums.add(granule.mass, granule.position, granule.radius, -1, granule.held);
+    MassProperties& sums = this->body(body).mass;
+    const double radius = turning_radius(granule.radius);
+    sums.add(granule.mass, to, radius, +1, granule.held);
+    sums.add(granule.mass, granule.position, radius, -1, granule.held);
   }
 
   /// A body as it was (from a restart file), and a granule that was in it. Returns its number.
@@ -207,8 +216,9 @@ class SolidBodies {
   const std::vector<int>& split_parents() const { return split_parents_; }
 
   int body_of(std::int64_t tag) const;  ///< 0 if not locked on this rank
-  SolidBody& body(int number) { return bodies_.at(number); }
-  const SolidBody& body(int number) const { return bodies_.at(number); }
+  /// std::exception for a number that no living body has.
+  SolidBody& body(int number) { return const_cast<SolidBody&>(std::as_const(*this).body(number)); }
+  const SolidBody& body(int number) const;
   /// Frame of a body, or of one that was swallowed and whose granules have not been moved yet.
   const Pose& pose(int number) const;
   std::map<int, SolidBody>& bodies() { return bodies_; }
@@ -243,6 +253,7 @@ class SolidBodies {
   void sum_anew(int number, std::int64_t member, const FrozenContacts& contacts, const MassOf& mass_of);
 
   Vec3 periods_ = Vec3::Zero();
+  bool granules_turn_ = true;
   BodyElsewhere elsewhere_;
   FlatMap<int, std::int32_t> member_;   // tag -> body, to be resolved by root()
   mutable std::vector<int> parent_{0};  // union-find over body numbers; 0 is no body

@@ -182,7 +182,7 @@ TEST(AdapterRecords, MotionWordsAreThoseOfPlaceVelocityAndSpin) {
   std::vector<double> record;
   int layout = 0;
   records.pack(0, record, layout);
-  const std::vector<int> all = records.motion_words(0, true), without_places = records.motion_words(0, false);
+  const std::vector<int> all = records.motion_words(0, true, true), without_places = records.motion_words(0, false, true);
   std::multiset<double> words, numbers;
   for (const int w : all) words.insert(record[static_cast<std::size_t>(w)]);
   for (int d = 0; d < 3; ++d)

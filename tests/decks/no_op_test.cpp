@@ -95,6 +95,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{bed("hertz_history_epsd2", "model hertz tangential history rolling_friction epsd2"), cover},
         Case{bed("hertz_history_mesh", "model hertz tangential history", true), cover},
         Case{bed("hertz_plain", "model hertz tangential no_history"), cover},
+        Case{bed("hertz_off", "model hertz tangential off"), cover},
         Case{bed("hertz_cdt", "model hertz tangential history rolling_friction cdt"), cover},
         Case{bed("hooke_history", "model hooke tangential history"), cover},
         Case{bed("hooke_history_epsd_mesh", "model hooke tangential history rolling_friction epsd", true), cover},

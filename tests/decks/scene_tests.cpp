@@ -412,6 +412,31 @@ TEST(Scenes, TheRegionHoldsTheBodiesAndNothingElse) {
   e.run("thermo_style custom step atoms\nuncompute inside\nregion solid delete\nregion rest delete\nunfix cull\nrun 0\n");
 }
 
+/// No contact turns a granule there, and no body does.
+TEST(Scenes, WithoutFrictionEachGranuleKeepsItsSpin) {
+  Bed bed;
+  bed.name = "smooth";
+  bed.contact = "model hertz tangential off";
+  for (const char* keywords : {"exterior live depth 1.5", "exterior sleep", "exterior sleep store compact", "motion fixed"}) {
+    Engine e;
+    // slower than what counts as motion; gravity that leans makes bodies rock
+    e.run(read_bed(bed) +
+          "run 0\nset group all omegax 1e-4 omegay -2e-4 omegaz 5e-4\nfix cull all solid/cull every 50 calm 2 speed 0.05 "
+          "tolerance 30 0 " +
+          keywords + "\nrun 500\n");
+    ASSERT_GT(f(e, 3), 100) << keywords;
+    expect_all_there(e, "cull", 1300);
+    e.run("unfix grav\nfix grav all gravity 9.81 vector 0.01 0 -1\nrun 200\n");
+    ASSERT_GT(f(e, 2) + f(e, 3), 100) << keywords;
+    e.run("unfix cull\nrun 0\n");
+    const State all = e.state();
+    ASSERT_EQ(all.size(), 1300u);
+    const Vec spin = {1e-4, -2e-4, 5e-4};
+    for (const auto& g : all)
+      for (int d = 0; d < 3; ++d) ASSERT_EQ(g.second.omega[d], spin[d]) << "granule " << g.first << ", " << keywords;
+  }
+}
+
 TEST(Scenes, GravityThatTurnsWakesEverything) {
   Bed bed;
   bed.name = "gravity";

@@ -138,6 +138,12 @@ TEST(WallContacts, OfPlanesAndACylinder) {
   // a sphere that is no atom
   EXPECT_TRUE(walls.primitive_near({beside, 0.0125}, 0.0006));  // 0.5 mm from the mantle
   EXPECT_FALSE(walls.primitive_near({beside, 0.0125}, 0.0004));
+  // on the axis and, for the engine, on it
+  for (const double off : {0.0, 5e-9}) {
+    const Vec3 on_axis = axis + Vec3(off, 0, 0.02);
+    EXPECT_TRUE(walls.primitive_near({on_axis, 0.0125}, 0.0046));  // 4.5 mm from the mantle
+    EXPECT_FALSE(walls.primitive_near({on_axis, 0.0125}, 0.0044));
+  }
   EXPECT_TRUE(walls.primitive_near({at_floor, radius}, 0.0));
   EXPECT_FALSE(walls.primitive_near({over_floor, radius}, 0.0));
 

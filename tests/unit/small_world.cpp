@@ -337,9 +337,9 @@ void SmallAtoms::pack(int i, std::vector<double>& record, int& layout) {
   record[colour_word] = colour[k];
 }
 
-std::vector<int> SmallAtoms::motion_words(int, bool positions) {
+std::vector<int> SmallAtoms::motion_words(int, bool positions, bool spins) {
   std::vector<int> numbers;
-  for (int w = positions ? at_word : velocity_word; w < radius_word; ++w) numbers.push_back(w);
+  for (int w = positions ? at_word : velocity_word; w < (spins ? radius_word : spin_word); ++w) numbers.push_back(w);
   return numbers;
 }
 
@@ -586,7 +586,10 @@ std::vector<SmallWalls::Touch> SmallWalls::find(double gap) const {
 
 std::vector<WallContact> SmallWalls::contacts() const {
   std::vector<WallContact> all;
-  for (const Touch& t : find(world_.run.skin)) all.push_back({t.granule, t.to_wall, t.gap, t.moving});
+  for (const Touch& t : find(world_.run.skin)) {
+    const bool half = t.mesh >= 0 && !t.moving;
+    if (!half || t.gap < 0.5 * world_.run.skin) all.push_back({t.granule, t.to_wall, t.gap, t.moving});
+  }
   return all;
 }
 

@@ -111,6 +111,35 @@ TEST(Cover, a_still_wall_closes_until_the_deck_takes_it_away) {
   EXPECT_FALSE(cube.deep(3, 3, 0));
 }
 
+TEST(Cover, a_thin_plate_closes_the_surface_on_either_side) {
+  for (int axis = 0; axis < 3; ++axis)
+    for (const bool moving : {false, true}) {
+      SmallDeck deck = empty_space();
+      Vec3 normal = Vec3::Zero();
+      normal[axis] = 1;
+      deck.planes = {{"upper", Vec3::Zero(), normal, moving}, {"lower", Vec3::Zero(), -normal, moving}};
+      // a layer on either side, and only what touches the plate on its own side is told of it
+      SmallWorld world(deck);
+      WorldParts parts(world, Settings(), 2 * r);
+      const int n = 9;
+      for (int side : {0, 1})
+        for (int k = 0; k < n * n; ++k) {
+          Vec3 x = Vec3::Zero();
+          x[axis] = side ? r : -r;
+          x[(axis + 1) % 3] = apart * (k % n);
+          x[(axis + 2) % 3] = apart * (k / n);
+          world.add(1 + k + side * n * n, x, r);
+        }
+      world.reneighbour();
+      std::vector<WallContact> contacts;
+      for (const WallContact& c : world.walls.contacts())
+        if (std::abs(c.gap) < 0.1 * r) contacts.push_back(c);
+      ASSERT_EQ(contacts.size(), static_cast<std::size_t>(2 * n * n));
+      parts.cover.close_behind_walls(contacts, [](int) { return true; });
+      EXPECT_EQ(parts.cover.plugs(), static_cast<std::size_t>(2 * n * n)) << "axis " << axis << ", moving " << moving;
+    }
+}
+
 /// The granules in the middle of the cube are locked, one in the centre is stored.
 struct Culled : Cube {
   Culled() {

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <exception>
 #include <map>
 #include <random>
 #include <tuple>
@@ -352,6 +353,14 @@ TEST(FrozenWallLoads, count_their_memory) {
   const std::size_t before = loads.memory_bytes();
   for (int tag = 1; tag <= 1000; ++tag) loads.add(tag, 1, {up(tag, 1)});
   EXPECT_GT(loads.memory_bytes(), before + 1000 * sizeof(WallLoad));
+}
+
+TEST(FrozenWallLoads, taking_away_from_a_body_that_bears_nothing_founds_none) {
+  FrozenWallLoads loads;
+  loads.add(1, 5, {up(0, 1)});
+  EXPECT_THROW(loads.erase(1, 6), std::exception);
+  EXPECT_THROW(loads.move(1, 6, 7), std::exception);
+  EXPECT_EQ(listed(loads).size(), 1u);
 }
 
 }  // namespace

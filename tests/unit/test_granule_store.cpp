@@ -242,6 +242,20 @@ TEST(GranuleStore, what_is_far_away_is_near_nothing) {
   EXPECT_EQ(heap.near({Vec3(0, 0, 0.5), 0.002}, 1.0).size(), 100u);
 }
 
+TEST(GranuleStore, places_that_are_no_numbers_are_near_nothing) {
+  GranuleStore store(0.01);
+  store.add(granule(1, Vec3(0.001, 0.002, 0.003), 0.005), nullptr, 0);
+  int seen = 0;
+  for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL, 1e300})
+    for (int d = 0; d < 3; ++d) {
+      Vec3 at = Vec3::Zero();
+      at[d] = bad;
+      store.for_each_near(1, {at, 0.005}, 0.001, [&](const Resident&) { ++seen; });
+      store.for_each_in_box(1, at, at, [&](const Resident&) { ++seen; });
+    }
+  EXPECT_EQ(seen, 0);
+}
+
 TEST(GranuleStore, box_queries_miss_nothing) {
   Heap heap(0.01, 15);
   for (std::int64_t tag = 1; tag <= 1000; ++tag) heap.add(tag, 0.1, 0.001, 0.002);

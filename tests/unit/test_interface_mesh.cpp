@@ -375,5 +375,30 @@ TEST(InterfaceMesh, one_thread_or_two_give_the_same_mesh) {
   EXPECT_THROW(set_geometry_threads(0), std::invalid_argument);
 }
 
+TEST(InterfaceMesh, questions_cost_no_pass_over_the_grid_while_nothing_changes) {
+  InterfaceMesh mesh(voxel, 0.0);
+  mesh.add(lattice(6, 8e-3));
+  Vec3 lo, hi;
+  const auto ask = [&] {
+    EXPECT_FALSE(mesh.empty());
+    mesh.bounds(lo, hi);
+    mesh.signed_distance(Vec3::Zero());
+    mesh.volume();
+  };
+  ask();
+  const std::size_t first = mesh.passes();
+  EXPECT_LE(first, 3u);
+  for (int n = 0; n < 100; ++n) {
+    mesh.set_pose(Pose(Vec3(1e-3 * n, 0, 0), Eigen::Quaterniond::Identity()));
+    ask();
+  }
+  EXPECT_EQ(mesh.passes(), first);
+  mesh.carve({Vec3::Zero(), 5e-3});
+  ask();
+  EXPECT_EQ(mesh.passes(), 2 * first);
+  mesh.carve({Vec3(20e-3, 20e-3, 20e-3), 0.1});
+  EXPECT_TRUE(mesh.empty());
+}
+
 }  // namespace
 }  // namespace solidcull

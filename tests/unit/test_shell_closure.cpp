@@ -245,6 +245,20 @@ TEST(ShellClosure, a_body_that_moves_to_a_wall_is_fetched_and_one_that_the_wall_
   }
 }
 
+TEST(ShellClosure, who_is_within_the_skin_of_a_still_mesh_stays_an_atom_while_its_body_may_move) {
+  for (const double skins : {0.7, 1.1}) {
+    Row row(with_floor(skins, false));
+    row.world.add(99, Vec3(0.5, 0.5, 0.5), r);  // the highest tag
+    row.parts.reneighbour();
+    row.parts.walls.update(row.world.walls.contacts(), false);
+    EXPECT_FALSE(row.parts.walls[row.world.at(5)].near);  // engines list what is nearer
+    EXPECT_EQ(row.store(), skins < 1 ? 0u : 10u);
+    row.ground();
+    row.parts.motion.refresh();
+    EXPECT_EQ(row.store(), skins < 1 ? 10u : 0u);
+  }
+}
+
 TEST(ShellClosure, who_is_at_a_wall_goes_to_the_store_only_once_its_body_stands) {
   for (const bool moving : {false, true}) {
     Row row(with_floor(0, moving));

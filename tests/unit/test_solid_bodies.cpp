@@ -257,6 +257,44 @@ TEST(MassProperties, of_the_parts_sum_to_the_whole) {
 
 // ------------------------------------------------------------------------------------------------------------ lock and merge
 
+TEST(SolidBodies, asking_for_a_body_that_is_gone_founds_none) {
+  Solid s;
+  s.granules[1] = s.granules[2] = {1, 0.1, Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+  s.lock(1);
+  s.unlock({1});
+  ASSERT_EQ(s.bodies.size(), 0u);
+  s.bodies.set_elsewhere([](std::int64_t tag) { return tag == 9 ? 1 : 0; });  // says so still
+  s.touch(2, 9);
+  s.granules[9] = s.granules[2];
+  s.places[9] = {1, Vec3::Zero()};
+  EXPECT_THROW(s.lock(2), std::exception);
+  EXPECT_THROW(s.bodies.body(1), std::exception);
+  EXPECT_THROW(s.bodies.join(9, 9, s.mass_of()), std::exception);
+  EXPECT_EQ(s.bodies.size(), 0u);
+}
+
+TEST(SolidBodies, where_contacts_turn_no_granule_bodies_are_made_of_points) {
+  Solid s;
+  s.bodies.set_granules_turn(false);
+  const double m = 2, r = 0.1;
+  const Vec3 spin(0, 0, 7);
+  s.granules[1] = {m, r, Vec3(0, 0, 0), Vec3(0, -1, 0), spin};
+  s.granules[2] = {m, r, Vec3(2 * r, 0, 0), Vec3(0, 1, 0), -3 * spin};
+  s.lock(1);
+  EXPECT_TRUE(s.bodies.body(s.bodies.body_of(1)).twist.spin.isZero(0) || s.bodies.body(s.bodies.body_of(1)).mass.spin == 0);
+  s.touch(1, 2);
+  s.lock(2);
+  SolidBody& pair = s.bodies.body(s.bodies.body_of(1));
+  pair.settle();
+  // two points at 0.2 m, each at 1 m/s across: 10 rad/s, whatever spins the balls have
+  EXPECT_LT((pair.motion.spin() - Vec3(0, 0, 10)).norm(), 1e-12);
+  EXPECT_LT((pair.motion.angular_momentum() - Vec3(0, 0, 2 * m * r)).norm(), 1e-12);
+  EXPECT_LT((pair.twist.at(Vec3(2 * r, 0, 0)) - Vec3(0, 1, 0)).norm(), 1e-12);
+  for (int step = 0; step < 100; ++step) pair.drift(1e-3);
+  EXPECT_TRUE(pair.motion.spin().allFinite());
+  EXPECT_LT((pair.motion.spin() - Vec3(0, 0, 10)).norm(), 1e-9);
+}
+
 TEST(SolidBodies, a_lone_granule_founds_a_body) {
   Solid solid;
   solid.granules[7] = granule(1.0, Vec3::Zero(), 0.1);

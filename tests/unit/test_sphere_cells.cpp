@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 #include <set>
 
@@ -163,6 +164,20 @@ TEST(SphereCells, building_anew_forgets_what_was_there) {
   EXPECT_EQ(cells.size(), 1u);
   EXPECT_EQ(cells.largest_radius(), 0.1);
   EXPECT_FALSE(cells.any_near({Vec3::Zero(), 1}, 0));
+}
+
+TEST(SphereCells, places_that_are_no_numbers_lead_nowhere) {
+  const double nan = std::nan(""), inf = HUGE_VAL;
+  for (const double bad : {nan, inf, -inf})
+    for (const bool first : {true, false}) {
+      std::vector<Sphere> spheres = {{Vec3::Zero(), 0.1}, {Vec3(1, 0, 0), 0.1}, {Vec3(0, 1, 0), 0.1}};
+      spheres.insert(first ? spheres.begin() : spheres.end(), {Vec3(0, bad, 0), 0.1});
+      SphereCells cells;
+      cells.build(spheres, 0.2);
+      EXPECT_EQ(cells.size(), 4u);
+      EXPECT_TRUE(cells.any_near({Vec3(1.05, 0, 0), 0.1}, 0.0));
+      EXPECT_FALSE(cells.any_near({Vec3(bad, 0, 0), 0.1}, 0.0));
+    }
 }
 
 }  // namespace

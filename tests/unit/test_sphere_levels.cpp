@@ -87,5 +87,21 @@ TEST(SphereLevels, a_far_sphere_does_not_hide_the_others) {
   expect_the_near_ones(cloud, 1, 0.01);
 }
 
+TEST(SphereLevels, places_that_are_no_numbers_lead_nowhere) {
+  for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL})
+    for (const int of : {0, 7}) {
+      Cloud cloud(20, 1, 1, 1, 0.1, 0.2, 5);
+      cloud.coordinates[static_cast<std::size_t>(3 * of + 1)] = bad;
+      SphereLevels levels;
+      levels.build(cloud.size(), cloud.centres.data(), cloud.radii.data(), 1, 0.01);
+      int found = 0;
+      levels.for_each_near(cloud.centres[of], cloud.radii[of], [&](int, double) { ++found; });
+      EXPECT_EQ(found, 0);
+      const int other = of + 1;
+      levels.for_each_near(cloud.centres[other], cloud.radii[other], [&](int j, double) { found += j == other; });
+      EXPECT_EQ(found, 1);
+    }
+}
+
 }  // namespace
 }  // namespace solidcull

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -342,6 +343,41 @@ TEST(Survey, two_bodies_that_have_rested_against_each_other_are_joined) {
   bed.parts.change({}, bed.proposal);
   EXPECT_EQ(bed.parts.body_of(1), bed.parts.body_of(4));
   EXPECT_EQ(bed.parts.solid.bodies().size(), 1u);
+}
+
+/// The same count, where a granule touches two of the other body.
+TEST(Survey, contacts_do_not_count_one_by_one_before_bodies_join) {
+  Bed bed;
+  const double apart = 2 * r - 5 * bed.weight() / bed.world.deck.stiffness;
+  bed.world.add(1, Vec3::Zero(), r);
+  bed.world.add(2, Vec3(apart, 0, 0), r);
+  bed.world.add(3, Vec3(0.5 * apart, 0.05, 0), r);
+  bed.world.add(4, Vec3(1.5 * apart, 0.05, 0), r);
+  bed.world.reneighbour();
+  bed.world.compute_forces();
+  bed.parts.lock({1, 2, 3, 4});
+  SolidBody& second = bed.parts.solid.body(bed.parts.body_of(3));
+  second.shift(Vec3(0, std::sqrt(0.75) * apart - 0.05, 0));
+  second.take_twist();
+  bed.parts.motion.refresh();
+  bed.parts.motion.place();
+  bed.parts.reneighbour();
+  ASSERT_NE(bed.parts.body_of(1), bed.parts.body_of(3));
+  ASSERT_TRUE(bed.world.contacts.listed(1, 3) && bed.world.contacts.listed(2, 3) && bed.world.contacts.listed(2, 4));
+  bed.parts.motion.is_stale();
+  for (int n = 1; n < looks_to_calm; ++n) {
+    bed.look();
+    EXPECT_TRUE(bed.proposal.joins.empty()) << n;
+    EXPECT_EQ(bed.calm(2), n);
+    EXPECT_EQ(bed.calm(3), n);
+  }
+  bed.look();
+  EXPECT_EQ(bed.proposal.joins.size(), 3u);
+  // who leaves the other body begins anew
+  bed.world.atoms.set_place(bed.world.at(3), Vec3(0, 0.5, 0));
+  bed.world.atoms.set_place(bed.world.at(4), Vec3(0, 0.52, 0));
+  bed.look();
+  EXPECT_EQ(bed.calm(2), 0);
 }
 
 TEST(Survey, two_bodies_that_slide_on_each_other_are_not) {
