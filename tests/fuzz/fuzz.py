@@ -32,8 +32,9 @@ def verdict_of(deck, place):
     stock = judge.run(deck, False, STOCK, place / "stock")
     mine = judge.run(deck, True, LAUNCHER, place / "culled")
     verdict = judge.judge(deck, stock, mine)
+    verdict.culled = mine.culled
     if verdict.kind in ("height", "weight", "count", "check") and chancy(deck, stock, verdict, place):
-        return judge.Verdict("good", "within the scatter of stock")
+        return judge.Verdict("good", "within the scatter of stock", mine.culled)
     return verdict
 
 
@@ -73,7 +74,7 @@ def main(argv=None):
     p.add_argument("--print", action="store_true", dest="show")
     options = p.parse_args(argv)
     ranks = [int(n) for n in options.ranks.split(",")] if options.ranks else None
-    kinds, began = collections.Counter(), time.monotonic()
+    kinds, slept, began = collections.Counter(), 0, time.monotonic()
     for seed in range(options.seed, options.seed + options.count):
         deck = grammar.make(seed, options.between, ranks)
         if options.show:
@@ -82,6 +83,7 @@ def main(argv=None):
         place = options.keep / str(seed)
         verdict = verdict_of(deck, place)
         kinds[verdict.kind] += 1
+        slept += verdict.culled > 0
         if verdict.kind == "unjudged":
             print(f"seed {seed}: unjudged: {verdict.text}", flush=True)
         if not verdict.fails() and not options.keep_all:
@@ -96,7 +98,7 @@ def main(argv=None):
             print(f"seed {seed}, the smallest deck: {again.kind}: {again.text}")
             show(smallest)
     print(f"{options.count} decks from seed {options.seed}: {', '.join(f'{n} {k}' for k, n in kinds.most_common())}; "
-          f"{time.monotonic() - began:.0f} s")
+          f"{slept} culled something; {time.monotonic() - began:.0f} s")
     return 1 if any(judge.Verdict(k).fails() for k in kinds) else 0
 
 

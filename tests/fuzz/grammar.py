@@ -46,16 +46,17 @@ class Grammar:
 
     def deck(self):
         rng = self.rng
-        self.side = rng.choice((4, 5, 6, 7))
-        self.layers = rng.randint(3, max(3, min(8, MOST // self.side**2)))
+        self.side = rng.choice((4, 5, 5, 6, 6, 7))
+        self.layers = rng.randint(5, max(5, min(11, MOST // self.side**2)))
         self.box = self.side * D
         self.top = 0.06 if self.side > 4 else 0.08
         self.room = self.box * (2 if self.chance(0.15) else 1)  # the bed may stand behind a wall within the box
         self.periodic = [self.room == self.box and self.chance(0.15), self.chance(0.15)]
-        shut = rng.choice("ffmms")
-        self.boundary = ["p" if p else shut for p in self.periodic] + [rng.choice("ffms") if shut == "f" else shut]
+        self.how = rng.choice(("lattice", "lattice", "pack", "pack", "rate"))
+        shut = rng.choice("ffmms" if self.how == "lattice" else "ffmm")  # LIGGGHTS wraps no box without granules
+        self.boundary = ["p" if p else shut for p in self.periodic] + [rng.choice("ffm") if shut == "f" else shut]
         self.skin = rng.choice((0.0003, 0.0004, 0.0006, 0.001))
-        self.dt = rng.choice((1e-5, 2e-5, 2e-5, 3e-5))
+        self.dt = rng.choice((2e-5, 3e-5, 3e-5))
         self.poly = self.chance(0.5)
         self.model()
         self.ranks_of = [self.pick_ranks()]
@@ -152,7 +153,7 @@ class Grammar:
         self.say("fix integrate all nve/sphere" if self.chance(0.9) else "fix integrate all nve/limit radius_ratio 0.5", needed=True)
         self.say("compute ke all ke", f"thermo {rng.choice((100, 500, 1000))}", "thermo_style custom step atoms ke c_ke",
                  f"thermo_modify lost {'error' if self.chance(0.8) else 'ignore'} norm no")
-        how = rng.choice(("lattice", "lattice", "pack", "pack", "rate"))
+        how = self.how
         early = self.chance(0.3)
         if early:
             self.cull()
@@ -161,9 +162,14 @@ class Grammar:
             steps = rng.choice((0, 0, 100, 400))
         else:
             self.insertion(how)
-            steps = rng.choice((1500, 2500))
+            steps = int(rng.choice((0.05, 0.1, 0.12, 0.12)) / self.dt)  # the fall takes 0.1 s
+        damp = steps > 1000 and self.chance(0.7)
+        if damp:
+            self.say("fix damp all viscous 1e-3")
         if steps:
             self.say(f"run {steps}")
+        if damp:
+            self.say("unfix damp")
         if how == "rate" and self.chance(0.7):
             self.say("unfix ins")
             self.inserting = None
@@ -175,7 +181,7 @@ class Grammar:
 
     def lattice(self):
         rng = self.rng
-        space = rng.choice((1.0, 1.0, 1.02, 1.2))
+        space = rng.choice((1.0, 1.0, 1.0, 1.02, 1.2))
         high = self.layers * D * space
         self.say(f"lattice sc {D * space:.6f} origin 0.5 0.5 0.5", f"region fill block 0 {self.box:.4f} 0 {self.box:.4f} 0 {high:.5f} units box",
                  "create_atoms 1 region fill", f"set group all diameter {D} density {DENSITY}", needed=True)
@@ -199,7 +205,7 @@ class Grammar:
         n = min(MOST, self.side**2 * self.layers)
         self.say(f"region pour block 0 {self.box:.4f} 0 {self.box:.4f} 0.002 {self.top - 0.002:.4f} units box", needed=True)
         common = "distributiontemplate dist maxattempt 200"
-        words = "overlapcheck yes all_in yes vel constant 0 0 -0.5 region pour"
+        words = "overlapcheck yes all_in yes vel constant 0 0 -1 region pour"
         if how == "pack":
             self.say(f"fix ins all insert/pack seed 32452867 {common} insert_every once {words} particles_in_region {n}", needed=True)
         else:
@@ -212,9 +218,9 @@ class Grammar:
 
     def keywords(self):
         rng, words = self.rng, []
-        offers = [(0.6, ["exterior sleep", "exterior sleep", "exterior live"]), (0.5, ["every 10", "every 20", "every 50"]),
-                  (0.4, ["calm 1", "calm 2", "calm 3"]), (0.5, ["speed 0.05", "speed 0.5", "speed 0.002"]),
-                  (0.4, ["tolerance 30 0", "tolerance 1 0", "tolerance 3 0.1", "tolerance 300 0"]), (0.4, ["depth 1", "depth 1.5", "depth 3"]),
+        offers = [(0.7, ["exterior sleep", "exterior sleep", "exterior live"]), (0.6, ["every 10", "every 10", "every 20", "every 50"]),
+                  (0.5, ["calm 1", "calm 2", "calm 3"]), (0.7, ["speed 0.05", "speed 0.5", "speed 0.5", "speed 0.002"]),
+                  (0.5, ["tolerance 30 0", "tolerance 30 0", "tolerance 1 0", "tolerance 3 0.1", "tolerance 300 0"]), (0.4, ["depth 1", "depth 1.5", "depth 3"]),
                   (0.15, ["carve 1 1", "carve 3 2"]), (0.15, ["motion fixed"]), (0.2, ["walls surface"]), (0.25, ["store compact"]),
                   (0.1, ["voxel 0.4"]), (0.05, ["bed 200 bed.*.vtp"]), (0.05, ["mesh 200 mesh.*.stl"])]
         for p, choices in offers:
@@ -239,7 +245,7 @@ class Grammar:
             self.run()
 
     def run(self):
-        steps = self.rng.choice((50, 100, 200, 300, 600))
+        steps = self.rng.choice((50, 100, 200, 400, 800))
         how = self.rng.random()
         if how < 0.1:
             self.say(f"run {steps} every {max(20, steps // 4)} \"print 'on the way'\"")

@@ -16,7 +16,7 @@ SLACK = (5, 0.05)    # granules and share: counts that hang on chance
 
 MPI = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_plm_rsh_agent": "",
        "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMP_NUM_THREADS": "1",
-       "OMPI_MCA_ess_singleton_isolated": "1"}
+       "OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
 
 # the plug-in may refuse these; anything else that it refuses is to be looked at
 REFUSALS = [r"insertion of a granule where a culled one is"]
@@ -36,6 +36,7 @@ class End:
     weight: float = None
     created: int = 0
     deleted: int = 0
+    culled: int = 0
 
     def crashed(self):
         crash = CRASH.search(self.text)
@@ -103,6 +104,7 @@ def read(end, shown):
     for name, total in re.findall(r"INFO: Particle insertion (\w+): .*a total of (\d+) particle", shown):
         totals[name] = int(total)
     end.created += sum(totals.values())
+    end.culled += sum(map(int, re.findall(r"^fix cull solid/cull: .*; culled (\d+)", shown, re.M)))
     end.deleted += sum(map(int, re.findall(r"^Deleted (\d+) atoms", shown, re.M)))
 
 
@@ -111,7 +113,7 @@ class Verdict:
     """`kind`: "good", "unjudged" (stock fails too), "refused" (as it should), or what is wrong."""
     kind: str
     text: str = ""
-    refusal: str = ""
+    culled: int = 0  # granules, at times
 
     def fails(self):
         return self.kind not in ("good", "unjudged", "refused")
@@ -172,7 +174,7 @@ def judge(deck, stock, mine):
     if own:
         if len(set(own)) != 1 or not re.match(r"ERROR( on proc \d+)?: (fix cull solid/cull|region interface/mesh): \S", own[0]):
             return Verdict("message", " | ".join(own))
-        return Verdict("refused" if any(re.search(r, own[0]) for r in REFUSALS) else "refusal", own[0], own[0])
+        return Verdict("refused" if any(re.search(r, own[0]) for r in REFUSALS) else "refusal", own[0])
     if stock.status or stock.late:
         return Verdict("unjudged", "; ".join(stock.errors)[:200] or f"stock: status {stock.status}")
     if mine.status or mine.granules is None:
