@@ -52,7 +52,7 @@ def fewer_parts(deck, fails):
         size = size if cut and size == 1 else max(1, size // 2)
 
 
-def shrink(deck, fails, most=400):
+def shrink(deck, fails, most=200):
     """The smallest deck found that fails still; `fails(deck)` runs it. At most so many runs."""
     runs = 0
 
