@@ -357,7 +357,7 @@ class Grammar:
         self.say(f"set group {self.some()} " + rng.choice(("density 2000", "density 3000", "type 2", f"diameter {0.9 * D:g}", "vx 0.1")))
 
     def velocities(self):
-        self.say(f"velocity {self.some()} " + self.rng.choice(("set 0 0 0.3", "set 0 0 0", "set NULL 0.2 NULL", "zero linear", "scale 0.5",
+        self.say(f"velocity {self.some()} " + self.rng.choice(("set 0 0 0.3", "set 0 0 0", "set NULL 0.2 NULL", "zero linear",
                                                                f"ramp vx 0 0.2 z 0 {self.layers * D:.4f} units box")))
         self.traits.add("driven")
 

@@ -159,7 +159,8 @@ def judge_end(deck, stock, mine):
         if abs(height - height0) > HEIGHT * D:
             return Verdict("height", f"mean height {height / D:.3f} d, stock {height0 / D:.3f} d")
         if mine.weight is not None and stock.weight is not None and "driven" not in deck.traits:
-            if abs(mine.weight - stock.weight) > WEIGHT * 9.81 * mass:
+            bears_it = abs(abs(stock.weight) - 9.81 * mass0) < WEIGHT * 9.81 * mass0  # and nothing else, as sides or a lid
+            if bears_it and abs(mine.weight - stock.weight) > WEIGHT * 9.81 * mass:
                 return Verdict("weight", f"floor bears {mine.weight:.6g} N, stock {stock.weight:.6g} N, weight {9.81 * mass:.6g} N")
     return None
 
