@@ -364,6 +364,17 @@ class ContactModelChanges(Case):
         self.assertRegex(run.errors(run.screen)[0], "^ERROR: fix cull solid/cull: ")
 
 
+class FixLineAgain(Case):
+    def test_a_fix_of_the_same_name_finds_all_granules(self):
+        for ranks in (1, 2):
+            with self.subTest(ranks=ranks):
+                run = self.accepted(BLOCK + f"{CULL_BLOCK}\nrun 200\nvariable i equal f_cull[3]\nprint \"stored ${{i}}\"\n{CULL_BLOCK}\nrun 20\n"
+                                    "unfix cull\nrun 0\nvariable n equal atoms\nprint \"atoms ${n}\"\n", ranks=ranks)
+                stored, atoms = (int(re.search(rf"^{word} (\d+)$", run.screen, re.M)[1]) for word in ("stored", "atoms"))
+                self.assertGreater(stored, 0)
+                self.assertEqual(atoms, 343)
+
+
 class InternalErrors(Case):
     def test_an_internal_error_is_not_lost_with_the_buffers(self):
         # interface granules that are deleted behind the fix's back: unfix finds that they are not there

@@ -240,7 +240,7 @@ class Grammar:
             self.run()
         for _ in range(self.rng.randint(1, 5)):
             if self.between != "none":
-                for _ in range(self.rng.randint(0, 3)):
+                for _ in range(self.rng.randint(0, 4)):
                     self.event()
             self.run()
 
@@ -258,9 +258,9 @@ class Grammar:
 
     def event(self):
         harmless = [self.talk, self.measure, self.run_nothing, self.lists, self.gravity_changes, self.wall_goes, self.tool_moves,
-                    self.again, self.restart_file, self.hold, self.time_step]
+                    self.again, self.restart_file, self.hold, self.time_step, self.loop, self.mesh_region]
         deep = [self.group, self.group, self.set_values, self.velocities, self.displace, self.delete, self.create, self.push, self.check,
-                self.check, self.pour_more]
+                self.check, self.pour_more, self.drive, self.integrate_some, self.write, self.ask, self.rare]
         self.rng.choice(harmless + (deep if self.between == "all" else []))()
 
     def talk(self):
@@ -327,6 +327,18 @@ class Grammar:
         if self.chance(0.5):
             self.say(f"run {self.rng.choice((50, 100))}", f"unfix {hold}")
         self.traits.add("driven")
+
+    def loop(self):
+        n, here = self.name("n"), self.name("here")
+        self.say(f"variable {n} loop {self.rng.randint(2, 6)}", f"label {here}", f"run {self.rng.choice((0, 10, 30))}", f"next {n}",
+                 f"jump SELF {here}")
+
+    def mesh_region(self):
+        if not self.culling:
+            return
+        r, g = self.name("solid"), self.name("g")
+        self.parts.append(Part([], [f"region {r} interface/mesh cull", f"group {g} region {r}", f"variable {g} equal count({g})",
+                                    f'print "in the mesh ${{{g}}}"', f"region {r} delete"]))
 
     # --- commands that see or change granules
 
@@ -399,6 +411,38 @@ class Grammar:
         if self.chance(0.6):
             self.say(f"run {self.rng.choice((50, 100))}", f"unfix {push}")
         self.traits.add("driven")
+
+    def drive(self):
+        drive = self.name("drive")
+        self.say(f"fix {drive} {self.some()} " + self.rng.choice(("momentum 50 linear 1 1 0", "ave/atom 10 5 50 vx vz", "viscous 1e-4", "drag 0 0 0 1e-4 1",
+                                                                  "lineforce 0 0 1", "spring/self 1e-2", "buoyancy level 0.02 dim z density 100",
+                                                                  "store/state 0 x y z", "aveforce 0 0 NULL", "move linear 0 0 0.01")))
+        if self.chance(0.6):
+            self.say(f"run {self.rng.choice((50, 100))}", f"unfix {drive}")
+        self.traits.add("driven")
+
+    def integrate_some(self):
+        self.say("unfix integrate", f"fix integrate {self.some()} nve/sphere", f"run {self.rng.choice((20, 100))}", "unfix integrate",
+                 "fix integrate all nve/sphere")
+        self.traits.add("driven")
+
+    def write(self):
+        self.say(self.rng.choice((f"write_dump {self.some()} custom {self.name('dump')} id x y z", f"write_data {self.name('data')}",
+                                  f"compute {self.name('rot')} all erotate/sphere")))
+
+    def ask(self):
+        v = self.name("v")
+        words = self.rng.choice((f"xcm({self.some()},z)", f"ke({self.some()})", f"bound({self.some()},zmax)", "c_ke", "ke", "atoms", "vcm(all,z)", "gyration(all)"))
+        self.say(f"variable {v} equal {words}", f'print "asked {words} ${{{v}}}"', f'if "${{{v}}} > 1" then "print yes" else "print no"')
+
+    def rare(self):
+        """What changes the box, or which granules there are."""
+        words = self.rng.choice(("change_box all z final -0.0001 0.07 units box", "delete_atoms overlap 0.0005 all all compress no",
+                                 "delete_atoms porosity fill 0.05 49979687 compress no", "reset_timestep 0",
+                                 "minimize 1e-6 1e-6 10 10"))
+        self.say(words)
+        if "delete" in words:
+            self.traits |= {"loose", "driven"}
 
     def pour_more(self):
         if self.inserting or not any("particledistribution" in line for p in self.parts for line in p.lines) or self.second_file:

@@ -19,7 +19,7 @@ MPI = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OM
        "OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
 
 # the plug-in may refuse these; anything else that it refuses is to be looked at
-REFUSALS = [r"insertion of a granule where a culled one is"]
+REFUSALS = [r"minimize would move atoms only"]
 CRASH = re.compile(r"terminate called|Segmentation fault|internal error|Signal: |\*\*\* Process received|AddressSanitizer|runtime error:"
                    r"|LeakSanitizer|corrupted|double free|Assertion")
 
