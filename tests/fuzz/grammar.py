@@ -52,14 +52,15 @@ class Grammar:
         self.top = 0.06 if self.side > 4 else 0.08
         self.room = self.box * (2 if self.chance(0.15) else 1)  # the bed may stand behind a wall within the box
         self.periodic = [self.room == self.box and self.chance(0.15), self.chance(0.15)]
-        self.how = rng.choice(("lattice", "lattice", "pack", "pack", "rate"))
+        self.ranks_of = [self.pick_ranks()]
+        self.slow = self.ranks_of[0][0] > 1  # where ranks share processors, each step waits for each rank
+        self.how = rng.choice(("lattice",) * 4 + ("pack",) if self.slow else ("lattice", "lattice", "pack", "pack", "rate"))
         shut = rng.choice("ffmms" if self.how == "lattice" else "ffmm")  # LIGGGHTS wraps no box without granules
         self.boundary = ["p" if p else shut for p in self.periodic] + [rng.choice("ffm") if shut == "f" else shut]
         self.skin = rng.choice((0.0003, 0.0004, 0.0006, 0.001))
         self.dt = rng.choice((2e-5, 3e-5, 3e-5))
         self.poly = self.chance(0.5)
         self.model()
-        self.ranks_of = [self.pick_ranks()]
         self.head()
         self.physics()
         self.bed()
@@ -159,10 +160,10 @@ class Grammar:
             self.cull()
         if how == "lattice":
             self.lattice()
-            steps = rng.choice((0, 0, 100, 400))
+            steps = rng.choice((0, 0, 20) if self.slow else (0, 0, 100, 400))
         else:
             self.insertion(how)
-            steps = int(rng.choice((0.05, 0.1, 0.12, 0.12)) / self.dt)  # the fall takes 0.1 s
+            steps = int(rng.choice((0.02,) if self.slow else (0.05, 0.1, 0.12, 0.12)) / self.dt)  # the fall takes 0.1 s
         damp = steps > 1000 and self.chance(0.7)
         if damp:
             self.say("fix damp all viscous 1e-3")
@@ -245,7 +246,7 @@ class Grammar:
             self.run()
 
     def run(self):
-        steps = self.rng.choice((50, 100, 200, 400, 800))
+        steps = self.rng.choice((20, 50, 100, 150) if self.slow else (50, 100, 200, 400, 800))
         how = self.rng.random()
         if how < 0.1:
             self.say(f"run {steps} every {max(20, steps // 4)} \"print 'on the way'\"")
