@@ -14,7 +14,7 @@ import judge  # noqa: E402
 from decks import CullLine, Deck, Part  # noqa: E402
 from shrink import shrink  # noqa: E402
 
-SEEDS = range(1, 21)
+SEEDS = (6, 10, 11, 12, 16, 21, 23, 25, 28, 29, 31, 32, 34, 37, 42, 43, 44, 46, 47, 49)  # of 50, those that cull
 RANKS = (1, 1, 1, 1, 2)
 
 
@@ -29,7 +29,7 @@ class RandomDecks(unittest.TestCase):
                     culled += verdict.culled > 0
                     self.assertFalse(verdict.fails(), f"{verdict.kind}: {verdict.text}\n"
                                      f"tests/fuzz/fuzz.py --seed {seed} --count 1 --ranks {','.join(map(str, RANKS))} --shrink")
-        self.assertGreaterEqual(culled, 8, "most decks cull nothing: they test nothing")
+        self.assertGreaterEqual(culled, 15, "most decks cull nothing: they test nothing")
 
 
 class Grammar(unittest.TestCase):

@@ -219,6 +219,13 @@ class Grammar:
 
     def keywords(self):
         rng, words = self.rng, []
+        if rng.random() < 0.6:  # in the few steps of a deck much is to be culled, and woken
+            words += [f"every {rng.choice((10, 10, 25))}", f"calm {rng.choice((1, 1, 2))}", f"speed {rng.choice((0.5, 0.5, 2))}",
+                      f"tolerance {rng.choice(('30 0', '30 0', '300 0', '10 0.1'))}"]
+            offers = [(0.7, ["exterior sleep", "exterior live depth 1", "exterior live depth 0.5 voxel 0.25", "exterior live depth 1.5"]), (0.15, ["carve 1 1", "carve 3 2"]),
+                      (0.15, ["motion fixed"]), (0.2, ["walls surface"]), (0.25, ["store compact"]), (0.05, ["bed 200 bed.*.vtp"]),
+                      (0.05, ["mesh 200 mesh.*.stl"])]
+            return words + [rng.choice(choices) for p, choices in offers if rng.random() < p]
         offers = [(0.7, ["exterior sleep", "exterior sleep", "exterior live"]), (0.6, ["every 10", "every 10", "every 20", "every 50"]),
                   (0.5, ["calm 1", "calm 2", "calm 3"]), (0.7, ["speed 0.05", "speed 0.5", "speed 0.5", "speed 0.002"]),
                   (0.5, ["tolerance 30 0", "tolerance 30 0", "tolerance 1 0", "tolerance 3 0.1", "tolerance 300 0"]), (0.4, ["depth 1", "depth 1.5", "depth 3"]),
@@ -416,7 +423,7 @@ class Grammar:
     def drive(self):
         drive = self.name("drive")
         self.say(f"fix {drive} {self.some()} " + self.rng.choice(("momentum 50 linear 1 1 0", "ave/atom 10 5 50 vx vz", "viscous 1e-4", "drag 0 0 0 1e-4 1",
-                                                                  "lineforce 0 0 1", "spring/self 1e-2", "buoyancy level 0.02 dim z density 100",
+                                                                  "lineforce 0 0 1", "spring/self 1e-2", 
                                                                   "store/state 0 x y z", "aveforce 0 0 NULL", "move linear 0 0 0.01")))
         if self.chance(0.6):
             self.say(f"run {self.rng.choice((50, 100))}", f"unfix {drive}")
@@ -440,7 +447,7 @@ class Grammar:
         """What changes the box, or which granules there are."""
         words = self.rng.choice(("change_box all z final -0.0001 0.07 units box", "delete_atoms overlap 0.0005 all all compress no",
                                  "delete_atoms porosity fill 0.05 49979687 compress no", "reset_timestep 0",
-                                 "minimize 1e-6 1e-6 10 10"))
+                                 "minimize 1e-6 1e-6 10 10" if self.chance(0.2) else "reset_timestep 1000"))
         self.say(words)
         if "delete" in words:
             self.traits |= {"loose", "driven"}
