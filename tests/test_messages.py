@@ -375,6 +375,15 @@ class FixLineAgain(Case):
                 self.assertEqual(atoms, 343)
 
 
+class MostIsDeleted(Case):
+    def test_what_the_deck_deletes_is_not_lost(self):
+        for keywords in ("", " exterior sleep"):
+            with self.subTest(keywords):
+                run = self.accepted(BLOCK + f"{CULL_BLOCK}{keywords}\nrun 200\ngroup gone id > 20\ndelete_atoms group gone compress no\nrun 50\n"
+                                    "unfix cull\nrun 0\nvariable n equal atoms\nprint \"atoms ${n}\"\n")
+                self.assertIn("atoms 20\n", run.screen)
+
+
 class InternalErrors(Case):
     def test_an_internal_error_is_not_lost_with_the_buffers(self):
         # interface granules that are deleted behind the fix's back: unfix finds that they are not there
