@@ -104,7 +104,9 @@ class Outcome:
         except errors.RunError as e:
             self.failed = str(e)
         self.text = log.read_text(errors="replace") if log.exists() else ""
-        self.seconds = process.wall
+        screen = log.with_suffix(".screen")
+        self.screen = screen.read_text(errors="replace") if screen.exists() else ""
+        self.seconds, self.status = process.wall, process.child.returncode
         ended = ENDED.search(self.text)
         self.granules = int(ended[1]) if ended else None
         totals = INSERTED.findall(self.text)
@@ -120,8 +122,8 @@ class Outcome:
         return self.failed is None and not self.late and self.granules is not None
 
     def why(self):
-        told = re.findall(r"^ERROR[^:]*: (.*?)(?: \(\S+:\d+\))?$", self.text, re.M)
-        return told[0] if told else self.failed or "it did not end"
+        told = re.findall(r"^ERROR[^:]*: (.*?)(?: \(\S+:\d+\))?$", self.text + self.screen, re.M)
+        return told[0] if told else f"stops without a word, with status {self.status}" if self.failed else "it did not end"
 
     def figure(self):
         if self.late:
