@@ -230,7 +230,12 @@ void Parcels::take_up_as_it_was(const Parcel& p) {
   for (const Parcel::Edge& e : p.edges) solid_.freeze_in_frame(e.low, e.high, e.history.empty() ? nullptr : e.history.data());
   for (const auto& [tag, g] : p.granules)
     if (g.record) solid_.enter_store(tag);
-  groups_.group();
+  // with `motion fixed` bodies are never settled: what a rigid one needs is not in such a file
+  const bool unsettled = std::any_of(p.bodies.begin(), p.bodies.end(), [](const SolidBody& b) { return !(b.motion.mass() > 0); });
+  if (ports_.ranks.any(unsettled))
+    groups_.settle();
+  else
+    groups_.group();
 }
 
 void Parcels::take_contacts(const std::vector<Parcel>& parcels, const std::map<std::int64_t, Taken>& taken) {

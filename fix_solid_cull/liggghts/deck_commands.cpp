@@ -84,14 +84,20 @@ bool has_commands(char** words, int n) {
   return std::any_of(words, words + n, [](const char* w) { return std::strcmp(w, "every") == 0; });
 }
 
+/// The fix line itself: one of the same ID would take the place of a fix that holds granules.
+bool is_own_line(const char* command, char** words, int n) {
+  return n > 2 && std::strcmp(command, "fix") == 0 && std::strcmp(words[2], "solid/cull") == 0;
+}
+
 }  // namespace
 
 MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, char** words, int& n)
     : lmp_(lmp) {
   if (!lmp->modify) return;
-  const Sight sight = sight_of(command, std::vector<std::string>(words, words + n), added);
-  const bool reads = sight == Sight::whole_bed || sight == Sight::all_restored;
   FixSolidCull* fix = fix_of(lmp);
+  Sight sight = sight_of(command, std::vector<std::string>(words, words + n), added);
+  if (is_own_line(command, words, n)) sight = fix ? Sight::all_restored : Sight::nothing;
+  const bool reads = sight == Sight::whole_bed || sight == Sight::all_restored;
   if (reads) refuse_part_of_a_bed(lmp, fix, std::string("before '") + command + "'");
   if (sight == Sight::run && (lists_are_void(lmp) || (fix && has_commands(words, n)))) set_up_after_all(words, n);
   if (fix && !fix->in_run()) {

@@ -95,7 +95,10 @@ const double* const* history_numbers(const LAMMPS_NS::FixContactHistory& fix) { 
 
 bool compresses_tags(const LAMMPS_NS::FixInsert& fix) { return fix.*member(InsertCompress()); }
 
-void expect_atoms(LAMMPS_NS::Thermo& thermo, long change) { thermo.*member(ThermoAtoms()) += change; }
+void expect_atoms(LAMMPS_NS::Thermo& thermo, long change) {
+  LAMMPS_NS::bigint& last = thermo.*member(ThermoAtoms());
+  if (last > 0) last += change;  // 0 from the start of a run to its first output
+}
 
 const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::Fix* fix) {
   const auto* pack = dynamic_cast<const LAMMPS_NS::FixInsertPack*>(fix);
