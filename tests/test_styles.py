@@ -14,6 +14,7 @@ HELPERS = {"MINIMIZE", "READ_RESTART", "RESPA", "STORE"}  # LIGGGHTS's own: no l
 FIX_ROWS = {"exact": "exact", "move granules": "integrates", "measure": "atoms_only", "hold": "holds", "act on each": "drives",
             "refused": "refused"}
 COMPUTE_ROWS = {"exact": "exact", "see atoms only": "atoms_only", "miss contacts": "contacts", "hold": "whole", "refused": "refused"}
+COMMAND_ROWS = {"nothing": "nothing", "begin": "run", "keep": "state", "see the whole": "whole_bed", "restore all": "all_restored"}
 # kinds of `liggghts -h` that the code has no table of, and the page's heading
 OTHER_KINDS = {"Atom styles:": "Atom styles", "Integrate styles:": "Integrate styles", "Pair styles:": "Pair styles",
                "Normal models for pair gran:": "Pair styles", "Tangential models for pair gran:": "Pair styles",
@@ -31,6 +32,10 @@ def fixes_in_code():
 
 def computes_in_code():
     return table_in("compute_styles.cpp")
+
+
+def commands_in_code():
+    return dict(re.findall(r'{"([^"]+)", (\w+)}', (CODE / "command_styles.cpp").read_text()))
 
 
 def section(heading):
@@ -60,10 +65,12 @@ class Styles(unittest.TestCase):
     def test_the_page_says_what_the_code_does(self):
         self.assertEqual(in_page("Fix styles", FIX_ROWS), {n: t for n, t in fixes_in_code().items() if n not in HELPERS})
         self.assertEqual(in_page("Compute styles", COMPUTE_ROWS), computes_in_code())
+        self.assertEqual(in_page("Command styles", COMMAND_ROWS), {n: t for n, t in commands_in_code().items() if n})
 
     @unittest.skipUnless(shutil.which("liggghts"), "no liggghts")
     def test_every_style_of_liggghts_is_in_its_table_once(self):
-        for kind, table, least in ("Fix styles", fixes_in_code(), 90), ("Compute styles:", computes_in_code(), 43):
+        for kind, table, least in (("Fix styles", fixes_in_code(), 90), ("Compute styles:", computes_in_code(), 43),
+                                   ("Command styles", commands_in_code(), 15)):
             styles = styles_of_liggghts(kind)
             self.assertGreater(len(styles), least)
             for style in styles:
