@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "engine.h"
+#include "lammps.h"
+#include "neighbor.h"
 
 namespace decks {
 namespace {
@@ -146,6 +148,30 @@ TEST_P(GoingOn, IsAsWithoutTheFix) {
   ASSERT_EQ(a.size(), b.size());
   // what was struck has come a twentieth of a diameter far
   EXPECT_LE(largest_difference(a, b, &Granule::x), 2e-3 * diameter);
+}
+
+TEST(ShortRuns, FetchNothingFromWallsThatAreAsTheyWere) {
+  Engine e;
+  e.run(read_bed(bed()) + "fix cull all solid/cull exterior sleep every 20 calm 2 speed 0.05 tolerance 12 0\nrun 400\n");
+  for (int k = 0; k < 8; ++k) e.run("run 0\n");  // what nothing is near any more goes in now and then
+  const double stored = interior(e), restored = e.vector("cull", 7);
+  ASSERT_GT(stored, 1000);
+  int builds = 0;
+  for (int k = 0; k < 10; ++k) {
+    e.run("run 0\n");
+    EXPECT_EQ(interior(e), stored) << "run " << k;
+    e.run("run 20\n");
+    builds += e.lammps()->neighbor->ncalls;
+  }
+  EXPECT_EQ(builds, 0);
+  EXPECT_EQ(e.vector("cull", 7), restored);
+  // a wall that is taken away between runs, or made anew, finds what stands at it
+  e.run("unfix x2\nfix x2 all wall/gran model hertz tangential history primitive type 1 xplane 0.026\nrun 0\n");
+  EXPECT_LT(interior(e), stored - 20);
+  e.run("run 200\n");
+  EXPECT_GT(interior(e), 0.9 * stored);
+  e.run("unfix x2\nrun 200\n");
+  EXPECT_GT(e.vector("cull", 7), restored + 50) << "what leant on it wakes";
 }
 
 const std::string left_half = "region left block INF 0.013 INF INF INF INF units box\n";
