@@ -140,6 +140,7 @@ void FixSolidCull::init() {
     rules_.refuse_what_cannot_be_culled();
     contacts_.connect();
     walls_.connect();
+    if (waits_for_run()) rules_.find_movable(atoms_, run_);  // write_restart takes up what a file holds, without a run
     culling_->begin_run();
   });
 }
