@@ -416,8 +416,12 @@ class Breakdowns(Case):
     def test_before_anything_is_culled(self):
         self.broken(self.PUSH.format(self.NOT_A_NUMBER, 340), "340", before="")
 
-    def test_a_force_larger_than_a_body_can_bear(self):
-        self.broken(self.PUSH.format("1e300", 340), r"\d+", CULL_BLOCK.replace("live depth 1", "sleep"))
+    def test_a_force_that_throws_a_granule_out_of_the_box(self):
+        for exterior in ("live depth 1", "sleep"):
+            run = Run(BLOCK + CULL_BLOCK.replace("live depth 1", exterior) + "\nrun 200\n" + self.PUSH.format("1e300", 340) + "run 200\n")
+            told = run.errors(run.output) or run.errors(run.screen)
+            self.assertEqual(len(told), 1, run.output[-1500:])
+            self.assertRegex(told[0], "^ERROR: (Lost atoms|fix cull solid/cull: .* of granule .* is no number)")
 
     def lost(self, lines, cull, ranks):
         """What is thrown out of the box is lost, and nothing else happens."""
