@@ -466,6 +466,30 @@ class MostIsDeleted(Case):
                 self.assertIn("atoms 20\n", run.screen)
 
 
+class BoxThatFollows(Case):
+    """Its borders between ranks move with it, and granules of a body that lie on them change ranks."""
+    STICKY = "gran model hertz tangential off cohesion sjkr"
+    # columns of small and large granules that nothing holds, one of them on the border between two ranks
+    LOOSE = deck("delete_atoms group all", "lattice sc 0.003 origin 0.5 0.5 0.5", "region fill block 0 0.021 0 0.021 0 0.015 units box",
+                 "create_atoms 1 region fill", "set group all diameter 0.003 density 2500", "set group all type/fraction 2 0.4 67867967",
+                 "set type 2 diameter 0.0015", FIX, "run 0", "run 50", box="block 0 0.021 0 0.021 -0.0001 0.06", pair=STICKY)
+    for one, two in (("boundary f f f", "boundary s p s"), ("create_box 1", "create_box 2"), ("timestep 2e-5", "timestep 3e-5"),
+                     ("neighbor 0.0004", "neighbor 0.0003"), ("peratomtype 5.e6", "peratomtype 5.e6 5.e6"), ("peratomtype 0.3", "peratomtype 0.3 0.3"),
+                     ("peratomtypepair 1 0.3", "peratomtypepair 2 0.3 0.3 0.3 0.3"), ("peratomtypepair 1 0.5", "peratomtypepair 2 0.5 0.5 0.5 0.5"),
+                     ("wall/gran model hertz tangential history", "wall/gran model hertz tangential off cohesion sjkr"),
+                     ("pair_style", "fix m5 all property/global cohesionEnergyDensity peratomtypepair 2 5000 5000 5000 5000\npair_style"),
+                     ("fix grav all gravity 9.81 vector 0 0 -1\n", "")):
+        LOOSE = LOOSE.replace(one, two)
+
+    def test_runs_and_restart_files_on_several_ranks(self):
+        for ranks in (2, 3):
+            with self.subTest(ranks=ranks):
+                run = self.accepted(self.LOOSE + "write_restart stop.restart\nrun 50\nunfix cull\nrun 0\nvariable n equal atoms\n"
+                                    "print \"atoms ${n}\"\n", ranks=ranks)
+                self.assertRegex(run.screen, "culled [1-9]")
+                self.assertIn("atoms 245\n", run.screen)
+
+
 class OneRankWithoutMpirun(Case):
     """Open MPI starts a daemon for such a run, which fails on a machine that is busy; the launcher asks for none."""
     NO_DAEMON = "OMPI_MCA_ess_singleton_isolated"

@@ -390,14 +390,19 @@ void Culling::judge(bool may_cull, const Proposal& proposal) {
 
 // ------------------------------------------------------------------------------------------------------- a membership change
 
+/// Who leaves for another rank must be known before the engine sends it.
+void Culling::follow_box() {
+  p_.ports.ranks.follow_box();
+  if (!p_.ports.ranks.any(p_.ports.ranks.subdomain_changed())) return;
+  p_.ports.ranks.update();
+  p_.handover.forget_homes();
+}
+
 void Culling::change() {
   check_numbers(p_.ports.atoms);  // before they are sorted into cells, here and by the engine
   if (!p_.solid.has_store()) return;
   const auto timed = p_.report.time(Part::membership);
-  if (p_.ports.ranks.any(p_.ports.ranks.subdomain_changed())) {
-    p_.ports.ranks.update();
-    p_.handover.forget_homes();
-  }
+  follow_box();
   // another fix may have deleted granules in this hook
   if (phase_ == Phase::stepping && p_.lost.forget_lost()) settle_bodies();
   p_.ports.memory.freed(p_.exchange.begin_change());
@@ -418,6 +423,7 @@ void Culling::change() {
   }
   store_and_fetch(c, changes, shell_changed);
   if (changes || p_.ports.ranks.any(shell_changed)) publish(c);
+  follow_box();  // places of stored granules are rounded: the last digit of a border decides who owns what lies on it
   if (p_.handover.send_home()) count_restored();
   p_.lost.remember();
   open_for_insertion_ = false;

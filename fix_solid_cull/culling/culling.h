@@ -74,6 +74,7 @@ class Culling {
   void find_scales();
   void leave_lists();
   void take_changes(bool other_walls);
+  void follow_box();
   void take_arrivals();
   void settle_bodies();
   void refuse_what_lies_too_far() const;

@@ -232,6 +232,8 @@ class Ranks {
 
   /// False where one rank owns a box without periodic sides: exchange() gives nothing then.
   virtual bool has_neighbours() const = 0;
+  /// A box that follows the granules does so now, as the engine will before it sends them to other ranks. Collective.
+  virtual void follow_box() {}
   /// Subdomains may have moved: reads them anew. Collective.
   virtual void update() = 0;
   virtual bool subdomain_changed() const = 0;

@@ -66,6 +66,11 @@ std::array<double, 6> EngineRanks::own_borders() const {
   return own;
 }
 
+void EngineRanks::follow_box() {
+  constexpr int shrink_wrapped = 2;  // of Domain::nonperiodic
+  if (count > 1 && domain->nonperiodic == shrink_wrapped) domain->reset_box();
+}
+
 void EngineRanks::update() {
   const std::array<double, 6> mine = own_borders();
   boxes_.resize(6 * static_cast<std::size_t>(count));

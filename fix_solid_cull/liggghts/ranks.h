@@ -20,6 +20,7 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
   void largest(std::int64_t* numbers, int n) const override;
 
   bool has_neighbours() const override { return has_neighbours_; }
+  void follow_box() override;
   void update() override;
   bool subdomain_changed() const override;
   bool owns(const Vec3& place) const override;
