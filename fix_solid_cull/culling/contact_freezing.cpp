@@ -57,8 +57,8 @@ void ContactFreezing::freeze(const Changes& changes, const Proposal& proposal) {
       if (const int* a = index_.find(t.a)) rebase(*a, t.b, nullptr);
       if (const int* b = index_.find(t.b)) rebase(*b, t.a, nullptr);
     }
-  for (const auto& pair : joined)
-    if (!frozen.contains(pair.first, pair.second)) solid_.freeze_in_frame(pair.first, pair.second, nullptr);
+  for (const auto& [a, b] : joined)  // other ranks have told of theirs
+    if ((index_.contains(a) || index_.contains(b)) && !frozen.contains(a, b)) solid_.freeze_in_frame(a, b, nullptr);
   for (const Proposal::SideChange& c : proposal.side_changes) {
     const int* i = index_.find(c.interface_tag);
     if (i && shell_[*i].locked && !shell_[*i].fresh && freezes(c.interface_tag, c.other_tag)) shell_.rebase(*i, -c.force);

@@ -124,6 +124,9 @@ std::vector<double> Parcels::pack(const std::vector<std::int64_t>& stored, const
   std::size_t count = 0;
   const auto edge = [&](std::int64_t low, std::int64_t high, const double* history) {
     const int body = living.body_of(low) ? living.body_of(low) : living.body_of(high);
+    if (!body)
+      throw InternalError("a frozen contact of granules " + std::to_string(low) + " and " + std::to_string(high) +
+                          " is of no body of this rank");
     edges.numbers({double(low), double(high), double(index_of(body)), double(history != nullptr)});
     if (history) edges.numbers(history, contacts.width());
     ++count;

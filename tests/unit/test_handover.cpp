@@ -275,6 +275,29 @@ TEST(Snapshot, what_two_ranks_wrote_is_taken_up_by_any_number_of_ranks) {
   }
 }
 
+TEST(Handover, contacts_that_join_bodies_of_one_rank_are_no_matter_of_the_next) {
+  run_on_ranks(ranks_along_x(2), [](SmallWorld& w) {
+    constexpr double r = 0.005;
+    w.add(1, Vec3(-0.006, 0, 0), r);
+    w.add(2, Vec3(-0.006, 2 * r, 0), r);
+    w.add(3, Vec3(0.006, 0, 0), r);
+    WorldParts parts(w, sleeping_settings(), 2 * r);
+    parts.reneighbour();
+    for (const std::int64_t tag : {1, 2, 3}) {
+      parts.lock({tag});
+      parts.reneighbour();
+    }
+    Proposal proposal;
+    if (w.ranks.me == 0) {
+      EXPECT_NE(parts.body_of(1), parts.body_of(2));
+      proposal.joins = {{triple(Vec3(-0.006, 0, 0)), 1, 2}};
+    }
+    parts.change({}, proposal);
+    EXPECT_EQ(parts.solid.contacts().contains(1, 2), w.ranks.me == 0);
+    if (w.ranks.me == 0) EXPECT_EQ(parts.body_of(1), parts.body_of(2));
+  });
+}
+
 TEST(Snapshot, on_as_many_ranks_everything_is_as_it_was_to_the_last_bit) {
   for (const int ranks : {1, 2}) {
     File first, second;
