@@ -1,5 +1,5 @@
-/* For programs that embed LIGGGHTS: libsolidcull.so is linked before libliggghts.so, or preloaded. Loaded later (dlopen) it misses
-   LIGGGHTS's calls, and the fix says so and stops. */
+/* For programs that embed LIGGGHTS: libsolidcull.so is linked before libliggghts.so, or preloaded. Loaded later (dlopen) it
+   misses LIGGGHTS's calls, and the fix says so and stops. */
 #ifndef SOLIDCULL_H
 #define SOLIDCULL_H
 

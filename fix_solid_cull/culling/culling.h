@@ -42,7 +42,7 @@ class Culling {
   void show_bed();
   /// What was culled and not changed is culled again; what was changed wakes when the run begins.
   void hide_bed();
-  bool bed_is_shown() const { return p_.shown.shown(); }  ///< local
+  bool bed_is_shown() const { return p_.shown.shown(); }      ///< local
   bool waits_for_run() const { return p_.snapshot.waits(); }  ///< for what a restart file holds. Local
   /// All granules become exterior. Returns how many were not, over all ranks.
   std::int64_t restore_all();

@@ -293,9 +293,9 @@ class Run {
   std::int64_t step = 0;      ///< goes on where the deck resets its time step
   std::int64_t reset_by = 0;  ///< the deck's number of this step, less `step`
   double dt = 0;              ///< s
-  double skin = 0;  ///< Verlet skin (m)
-  Box box, own;     ///< the whole box, this rank's subdomain
-  Box kept;         ///< what passes its sides is lost; infinite where the box is periodic or follows the granules
+  double skin = 0;            ///< Verlet skin (m)
+  Box box, own;               ///< the whole box, this rank's subdomain
+  Box kept;                   ///< what passes its sides is lost; infinite where the box is periodic or follows the granules
   std::array<bool, 3> periodic{};
   std::string name;  ///< the fix's ID
 

@@ -180,7 +180,7 @@ void ShownBed::judge(std::size_t number, int i) {
   // what walls and cover knew of an interface granule does not come back with it from another rank
   const bool changed = !is_as_shown(s, i) || (s.has_been_away && !s.stored);
   if (changed || !atoms.may_be_culled(i)) wakes();  // or the deck holds or drives it from now on
-  if (s.stored) atoms.mark_interface(i, true);  // as it went into the store
+  if (s.stored) atoms.mark_interface(i, true);      // as it went into the store
   if (changed || s.stored) {
     int layout = 0;
     atoms.pack(i, record_, layout);

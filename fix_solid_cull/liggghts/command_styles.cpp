@@ -148,12 +148,12 @@ bool reads_granules(const std::string& formula) {
     const std::string word = formula.substr(at, end - at);
     at = end;
     if (word.compare(0, 2, "v_") == 0) continue;  // evaluated for itself
-    if (is_one_of(word, {"PI",    "sqrt",    "exp",   "ln",        "log",       "abs",      "sin",    "cos",    "tan",  "asin",
-                         "acos",  "atan",    "atan2", "random",    "normal",    "ceil",     "floor",  "round",  "ramp", "stagger",
-                         "stride", "logfreq", "vdisplace", "swiggle", "cwiggle", "step",     "elapsed", "elaplong", "dt", "time",
-                         "cpu",   "tpcpu",   "spcpu", "cpuremain", "part",      "vol",      "lx",     "ly",     "lz",   "xlo",
-                         "xhi",   "ylo",     "yhi",   "zlo",       "zhi",       "xy",       "xz",     "yz",     "xlat", "ylat",
-                         "zlat"}))
+    if (is_one_of(word, {"PI",       "sqrt",    "exp",    "ln",      "log",       "abs",     "sin",       "cos",   "tan",
+                         "asin",     "acos",    "atan",   "atan2",   "random",    "normal",  "ceil",      "floor", "round",
+                         "ramp",     "stagger", "stride", "logfreq", "vdisplace", "swiggle", "cwiggle",   "step",  "elapsed",
+                         "elaplong", "dt",      "time",   "cpu",     "tpcpu",     "spcpu",   "cpuremain", "part",  "vol",
+                         "lx",       "ly",      "lz",     "xlo",     "xhi",       "ylo",     "yhi",       "zlo",   "zhi",
+                         "xy",       "xz",      "yz",     "xlat",    "ylat",      "zlat"}))
       continue;
     return true;
   }

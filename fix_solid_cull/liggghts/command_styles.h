@@ -8,11 +8,11 @@
 namespace solidcull {
 
 enum class Sight {
-  nothing,     ///< reads and changes no granule
-  run,         ///< begins a run
-  state,       ///< takes what is culled as it is
-  whole_bed,   ///< reads or changes granules or groups: all are atoms when it acts
-  all_restored ///< may make others of them: all are exterior when it acts, and stay so
+  nothing,      ///< reads and changes no granule
+  run,          ///< begins a run
+  state,        ///< takes what is culled as it is
+  whole_bed,    ///< reads or changes granules or groups: all are atoms when it acts
+  all_restored  ///< may make others of them: all are exterior when it acts, and stay so
 };
 
 struct CommandStyle {

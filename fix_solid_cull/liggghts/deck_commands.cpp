@@ -91,8 +91,7 @@ bool is_own_line(const char* command, char** words, int n) {
 
 }  // namespace
 
-MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, char** words, int& n)
-    : lmp_(lmp) {
+MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, char** words, int& n) : lmp_(lmp) {
   if (!lmp->modify) return;
   FixSolidCull* fix = fix_of(lmp);
   Sight sight = sight_of(command, std::vector<std::string>(words, words + n), added);

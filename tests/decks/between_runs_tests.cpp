@@ -176,8 +176,9 @@ TEST(ShortRuns, FetchNothingFromWallsThatAreAsTheyWere) {
 
 const std::string left_half = "region left block INF 0.013 INF INF INF INF units box\n";
 const std::string inner = "region inner block 0.008 0.018 0.008 0.018 0.004 0.012 units box\n";
-const std::string counts = "variable n equal count(all)\nvariable m equal mass(all)\nvariable z equal xcm(all,z)\n"
-                           "variable top equal bound(all,zmax)\nvariable low equal bound(all,zmin)\n";
+const std::string counts =
+    "variable n equal count(all)\nvariable m equal mass(all)\nvariable z equal xcm(all,z)\n"
+    "variable top equal bound(all,zmax)\nvariable low equal bound(all,zmin)\n";
 const std::vector<std::string> counted = {"n", "m", "z", "top", "low"};
 constexpr auto other_tags = Sequence::Left::other_tags;
 constexpr auto all_exterior = Sequence::Then::exterior;
@@ -193,14 +194,19 @@ INSTANTIATE_TEST_SUITE_P(
                  {"left", "right", "both"},
                  {}},
         Sequence{"group_and_delete_it", left_half + "group a region left\ngroup a delete\ngroup b id < 30\n", {"b"}, {}},
-        Sequence{"group_sums", left_half + "group left region left\nvariable n equal count(left)\nvariable m equal mass(left)\n",
-                 {"left"}, {"n", "m"}},
+        Sequence{"group_sums",
+                 left_half + "group left region left\nvariable n equal count(left)\nvariable m equal mass(left)\n",
+                 {"left"},
+                 {"n", "m"}},
         Sequence{"variables", counts, {}, counted},
-        Sequence{"region_variables", inner + "variable n equal count(all,inner)\nvariable m equal mass(all,inner)\n", {}, {"n", "m"}},
+        Sequence{
+            "region_variables", inner + "variable n equal count(all,inner)\nvariable m equal mass(all,inner)\n", {}, {"n", "m"}},
         Sequence{"one_granule_by_number", "variable h equal z[500]\nvariable d equal x[20]-x[10]\n", {}, {"h", "d"}},
         Sequence{"print", "print \"there are $(count(all)) granules\"\nvariable n equal count(all)\n", {}, {"n"}},
-        Sequence{"print_in_if", "variable n equal count(all)\nif \"${n} > 1000\" then \"set type 1 type 1\" \"print '${n}'\"\n",
-                 {}, {"n"}},
+        Sequence{"print_in_if",
+                 "variable n equal count(all)\nif \"${n} > 1000\" then \"set type 1 type 1\" \"print '${n}'\"\n",
+                 {},
+                 {"n"}},
         Sequence{"set_the_type_they_have", "set type 1 type 1\n", {}, {}},
         Sequence{"set_type_of_all", "set group all type 1\n", {}, {}, Sequence::Left::same_tags, all_exterior},
         Sequence{"set_size_of_few", "set atom 600 diameter 0.00255\nset atom 601 diameter 0.001\n", {}, {}},
@@ -211,33 +217,47 @@ INSTANTIATE_TEST_SUITE_P(
         Sequence{"velocity_of_all", "velocity all set 0 0 0.1\n", {}, {}, Sequence::Left::same_tags, all_exterior},
         Sequence{"velocity_ramp", "group few id < 20\nvelocity few ramp vx 0 0.1 z 0 0.02 units box\n", {"few"}, {}},
         Sequence{"displace_few", "group few id 100 200 300\ndisplace_atoms few move 0 0 0.04 units box\n", {"few"}, {}},
-        Sequence{"displace_across", "group few id 100 200 300 400\ndisplace_atoms few move 0.003 0.002 0.03 units box\n", {"few"}, {}},
+        Sequence{
+            "displace_across", "group few id 100 200 300 400\ndisplace_atoms few move 0.003 0.002 0.03 units box\n", {"few"}, {}},
         Sequence{"displace_all", "displace_atoms all move 0 0 0.02 units box\n", {}, {}, Sequence::Left::same_tags, all_exterior},
         Sequence{"delete_by_region", inner + "delete_atoms region inner compress no\n" + counts, {}, counted},
         Sequence{"delete_by_group", "group few id 100 200 300\ndelete_atoms group few compress no\n" + counts, {}, counted},
         Sequence{"delete_twice",
                  "group few id 100 200 300\ndelete_atoms group few compress no\ngroup more id 101 201\n"
-                 "delete_atoms group more compress no\n" + counts,
-                 {}, counted},
+                 "delete_atoms group more compress no\n" +
+                     counts,
+                 {},
+                 counted},
         Sequence{"delete_and_renumber", inner + "delete_atoms region inner\n" + counts, {}, counted, other_tags, all_exterior},
-        Sequence{"delete_many", "group many id > 1000\ndelete_atoms group many compress no\n", {}, {}, Sequence::Left::same_tags,
+        Sequence{"delete_many",
+                 "group many id > 1000\ndelete_atoms group many compress no\n",
+                 {},
+                 {},
+                 Sequence::Left::same_tags,
                  Sequence::Then::either},
-        Sequence{"create_one", "create_atoms 1 single 0.013 0.013 0.05 units box\ngroup new id > 1300\n"
-                               "set group new diameter 0.0026 density 2500\n",
-                 {"new"}, {}},
-        Sequence{"create_into_the_bed", "set atom 700 z 0.05\ncreate_atoms 1 single 0.013 0.013 0.05 units box\ngroup new id > 1300\n"
-                                        "set group new diameter 0.001 density 2500\nset group new z 0.01\n",
-                 {"new"}, {}},
+        Sequence{"create_one",
+                 "create_atoms 1 single 0.013 0.013 0.05 units box\ngroup new id > 1300\n"
+                 "set group new diameter 0.0026 density 2500\n",
+                 {"new"},
+                 {}},
+        Sequence{"create_into_the_bed",
+                 "set atom 700 z 0.05\ncreate_atoms 1 single 0.013 0.013 0.05 units box\ngroup new id > 1300\n"
+                 "set group new diameter 0.001 density 2500\nset group new z 0.01\n",
+                 {"new"},
+                 {}},
         Sequence{"write_data", "write_data between.data\n" + counts, {}, counted},
         Sequence{"write_dump", "write_dump all custom between.dump id x y z\n" + counts, {}, counted},
-        Sequence{"write_restart", left_half + "group left region left\nwrite_restart between.restart\nset atom 600 vz 0.2\n",
-                 {"left"}, {}},
+        Sequence{"write_restart",
+                 left_half + "group left region left\nwrite_restart between.restart\nset atom 600 vz 0.2\n",
+                 {"left"},
+                 {}},
         Sequence{"change_box", "change_box all boundary m m m\n", {}, {}, Sequence::Left::same_tags, all_exterior},
         Sequence{"reset_timestep", "reset_timestep 0\nset atom 600 vz 0.2\n", {}, {}},
         Sequence{"several_at_once",
                  left_half + "group left region left\nset atom 600 vz 0.2\ndisplace_atoms left move 0 0 0\n"
                              "group few id 1 2 3\ndelete_atoms group few compress no\nvelocity few set NULL NULL 0.01\n",
-                 {"left"}, {}}),
+                 {"left"},
+                 {}}),
     [](const auto& p) { return p.param.name; });
 
 INSTANTIATE_TEST_SUITE_P(
@@ -245,27 +265,38 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Sequence{"pre_no", "run 20 pre no\n", {}, {}},
         Sequence{"set_then_pre_no", "set atom 600 vz 0.2\nrun 20 pre no\n" + counts, {}, counted},
-        Sequence{"group_then_pre_no_twice", "group few id 600 601\nrun 10 pre no post no\nvelocity few set 0 0 0.1\nrun 10 pre no\n",
-                 {}, {}},
+        Sequence{"group_then_pre_no_twice",
+                 "group few id 600 601\nrun 10 pre no post no\nvelocity few set 0 0 0.1\nrun 10 pre no\n",
+                 {},
+                 {}},
         Sequence{"every", "run 20 every 5 \"set atom 600 vz 0.05\" \"variable n equal count(all)\"\n", {}, {"n"}},
         Sequence{"every_pre_no", "run 20 pre no every 5 \"velocity all set NULL NULL 0\"\n", {}, {}},
         Sequence{"every_null", "run 20 every 5 NULL\n", {}, {}},
         Sequence{"delete_between_many_runs",
                  "group few id 100 200\nrun 5\ndelete_atoms group few compress no\nrun 5\nset atom 300 vz 0.1\nrun 5\n" + counts,
-                 {}, counted},
-        Sequence{"unfix_then_delete", "run 5\nunfix cull\ngroup few id 100 200\ndelete_atoms group few compress no\n"
-                                      "fix cull all solid/cull\nrun 5\n",
-                 {}, {}},
+                 {},
+                 counted},
+        Sequence{"unfix_then_delete",
+                 "run 5\nunfix cull\ngroup few id 100 200\ndelete_atoms group few compress no\n"
+                 "fix cull all solid/cull\nrun 5\n",
+                 {},
+                 {}},
         Sequence{"frozen_group", "group few id < 50\nfix hold few freeze\nrun 20\nunfix hold\nrun 20\n", {}, {}},
-        Sequence{"driven_group", left_half + "group left region left\nfix push left addforce 1e-5 0 0\nrun 20\n"
-                                             "variable e equal ke(left)\n",
-                 {}, {"e"}},
-        Sequence{"narrower_gravity", left_half + "group left region left\nunfix grav\nfix grav left gravity 9.81 vector 0 0 -1\n"
-                                                 "run 20\nvariable e equal ke(all)\n",
-                 {}, {"e"}},
-        Sequence{"narrower_integrator", left_half + "group left region left\nunfix integr\nfix integr left nve/sphere\n"
-                                                    "velocity all set 0.01 0 0\nrun 20\nvariable e equal ke(all)\n",
-                 {}, {"e"}}),
+        Sequence{"driven_group",
+                 left_half + "group left region left\nfix push left addforce 1e-5 0 0\nrun 20\n"
+                             "variable e equal ke(left)\n",
+                 {},
+                 {"e"}},
+        Sequence{"narrower_gravity",
+                 left_half + "group left region left\nunfix grav\nfix grav left gravity 9.81 vector 0 0 -1\n"
+                             "run 20\nvariable e equal ke(all)\n",
+                 {},
+                 {"e"}},
+        Sequence{"narrower_integrator",
+                 left_half + "group left region left\nunfix integr\nfix integr left nve/sphere\n"
+                             "velocity all set 0.01 0 0\nrun 20\nvariable e equal ke(all)\n",
+                 {},
+                 {"e"}}),
     [](const auto& p) { return p.param.name; });
 
 }  // namespace

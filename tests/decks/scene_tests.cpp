@@ -327,8 +327,8 @@ std::vector<double> normal_loads(Engine& e) {
   return all;
 }
 
-/// Pushes the granules of its group: a fix that the culling takes for one that acts on none, for the table of styles has all of its
-/// family as exact.
+/// Pushes the granules of its group: a fix that the culling takes for one that acts on none, for the table of styles has all of
+/// its family as exact.
 class FixPush : public LAMMPS_NS::Fix {
  public:
   FixPush(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg) : Fix(lmp, narg, arg), force_(std::atof(arg[3])) {}

@@ -63,8 +63,7 @@ TEST(ShownBed, shows_every_granule_once_and_takes_back_what_was_not_touched) {
   EXPECT_EQ(world.atoms.owned, atoms);
   EXPECT_EQ(world.atoms.published, atoms);
   column.culling.restore_all();
-  for (int tag = 1; tag <= 12; ++tag)
-    EXPECT_LT((world.atoms.place(world.at(tag)) - places[tag]).norm(), 1e-15) << tag;
+  for (int tag = 1; tag <= 12; ++tag) EXPECT_LT((world.atoms.place(world.at(tag)) - places[tag]).norm(), 1e-15) << tag;
 }
 
 TEST(ShownBed, other_columns_and_groups_change_and_nothing_wakes) {
