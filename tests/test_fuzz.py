@@ -14,7 +14,8 @@ import judge  # noqa: E402
 from decks import CullLine, Deck, Part  # noqa: E402
 from shrink import shrink  # noqa: E402
 
-SEEDS = (6, 10, 11, 12, 16, 21, 23, 25, 28, 29, 31, 32, 34, 37, 42, 43, 44, 46, 47, 49)  # of 50, those that cull
+SEEDS = (6, 10, 11, 12, 16, 21, 23, 25, 28, 29, 31, 32, 34, 37, 42, 43, 44, 46, 47, 49,  # of 50, those that cull
+         5009, 5060, 40007)  # went wrong once
 RANKS = (1, 1, 1, 1, 2)
 
 

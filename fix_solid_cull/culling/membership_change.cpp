@@ -148,11 +148,11 @@ void MembershipChange::leave_body(std::int64_t tag) {
   atoms.set_velocity(i, back ? p_.shell[i].velocity : twist.at(x));
   if (p_.ports.contacts.turn_granules) atoms.set_spin(i, back ? p_.shell[i].spin : twist.spin);
   const double radius = p_.solid.bodies().turning_radius(atoms.radius[i]);
-  const MovingGranule given{atoms.mass[i], radius, x, atoms.velocity(i), atoms.spin(i)};
+  const MovingGranule given{atoms.mass[i], atoms.radius[i], x, atoms.velocity(i), atoms.spin(i)};
   const double before = p_.solid.kinetic_energy(body);
   p_.solid.unlock(tag, p_.masses(tag), back && p_.scales.rigid() ? &given : nullptr);
-  const double after = p_.solid.kinetic_energy(body) +
-                       RigidPart::granule(given.mass, given.radius, x, given.velocity, given.spin).kinetic_energy();
+  const double after =
+      p_.solid.kinetic_energy(body) + RigidPart::granule(given.mass, radius, x, given.velocity, given.spin).kinetic_energy();
   p_.solid.count_restored(after - before);
   p_.solid.thaw(tag);
 }

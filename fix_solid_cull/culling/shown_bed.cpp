@@ -14,8 +14,6 @@ constexpr double most_changed = 0.25;
 // so many granules' rows are kept for the next time: decks loop over commands and runs
 constexpr std::size_t worth_freeing = 100000;
 
-bool same_bits(const Vec3& a, const Vec3& b) { return std::memcmp(a.data(), b.data(), sizeof(Vec3)) == 0; }
-
 }  // namespace
 
 // ------------------------------------------------------------------------------------------------------------ out
@@ -161,8 +159,8 @@ void ShownBed::bring_strangers_home(std::vector<int>& at) {
 
 bool ShownBed::is_as_shown(const Shown& s, int i) const {
   const Atoms& atoms = ports_.atoms;
-  return same_bits(atoms.place(i), s.place) && same_bits(atoms.velocity(i), s.velocity) && same_bits(atoms.spin(i), s.spin) &&
-         atoms.radius[i] == s.radius && atoms.mass[i] == s.mass && atoms.type[i] == s.type;
+  return atoms.place(i) == s.place && atoms.velocity(i) == s.velocity && atoms.spin(i) == s.spin && atoms.radius[i] == s.radius &&
+         atoms.mass[i] == s.mass && atoms.type[i] == s.type;
 }
 
 /// What became of a granule, which is atom i.

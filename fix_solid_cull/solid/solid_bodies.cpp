@@ -214,7 +214,8 @@ SolidBodies::Place SolidBodies::lock(std::int64_t tag, const MovingGranule& gran
     const bool first = b.mass.count == 0;
     const Vec3 before = first ? Vec3(Vec3::Zero()) : b.pose.to_world(b.mass.centre());
     const double radius = turning_radius(granule.radius);
-    add(b, RigidPart::granule(granule.mass, radius, position, granule.velocity, granule.spin));
+    const Vec3 spin = granules_turn_ ? granule.spin : Vec3(Vec3::Zero());  // else it keeps its own
+    add(b, RigidPart::granule(granule.mass, radius, position, granule.velocity, spin));
     b.mass.add(granule.mass, b.pose.to_frame(position), radius, 1, granule.held);
     b.summed = std::max(b.summed, b.mass.count);
     if (!first) centre_moved(b, before);
@@ -263,8 +264,9 @@ void SolidBodies::unlock(std::int64_t tag, const GranuleMass& granule, const Fro
   // the difference to the body's own field stays with the body
   RigidPart rest = body.part();
   const Vec3 own_velocity = body.twist.at(given->position), own_spin = body.twist.spin;
-  const RigidPart difference = RigidPart::granule(given->mass, turning_radius(given->radius), given->position,
-                                                  own_velocity - given->velocity, own_spin - given->spin);
+  const RigidPart difference =
+      RigidPart::granule(given->mass, turning_radius(given->radius), given->position, own_velocity - given->velocity,
+                         granules_turn_ ? Vec3(own_spin - given->spin) : own_spin);
   const Vec3 momentum = difference.mass * difference.velocity;
   const Vec3 turning = difference.angular_momentum(rest.centre);
   RigidMotion motion(&rest, 1, body.free_axes());

@@ -163,8 +163,9 @@ class SolidBodies {
   /// while granules are locked.
   void set_granules_turn(bool on) { granules_turn_ = on; }
   bool granules_turn() const { return granules_turn_; }
-  /// Radius (m) with which a granule takes part in the turning of its body.
-  double turning_radius(double radius) const { return granules_turn_ ? radius : 0.0; }
+  /// Radius (m) with which a granule takes part in the turning of its body. Where no contact turns it, it is nearly a point: what
+  /// it has of inertia is far below that of two granules side by side, and far above what rounding leaves of none.
+  double turning_radius(double radius) const { return granules_turn_ ? radius : 1e-3 * radius; }
 
   /// Edges of the periodic box, 0 where it is not periodic (m).
   void set_periods(const Vec3& periods) { periods_ = periods; }
