@@ -6,7 +6,7 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 build=$root/build-sanitize
 # no build type: assertions stay in
 SOLIDCULL_BUILD=$build SOLIDCULL_CMAKE="-DCMAKE_BUILD_TYPE=None -DSOLIDCULL_SANITIZE=ON" \
-  "$root/scripts/prepare.sh" core_tests culling_tests geometry_tests deck_tests
+  "$root/scripts/prepare.sh" core_tests culling_tests geometry_tests relocation_tests deck_tests
 . "$root/scripts/mpi-env.sh"
 export LSAN_OPTIONS=suppressions=$root/tests/lsan.supp:print_suppressions=0 UBSAN_OPTIONS=print_stacktrace=1
 cd "$build"
