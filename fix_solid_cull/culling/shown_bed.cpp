@@ -1,8 +1,9 @@
 #include "shown_bed.h"
 
 #include <algorithm>
-#include <cstring>
 #include <string>
+
+#include "word_sum.h"
 
 namespace solidcull {
 namespace {
@@ -18,21 +19,18 @@ constexpr std::size_t worth_freeing = 100000;
 
 // ------------------------------------------------------------------------------------------------------------ out
 
-/// Of the numbers' bits (FNV-1a by words).
+/// Of all but its motion.
 std::uint64_t ShownBed::sum_of(const std::vector<double>& record) const {
-  std::uint64_t sum = 14695981039346656037u;
+  WordSum sum;
   auto motion = motion_words_.begin();
   for (std::size_t k = 0; k < record.size(); ++k) {
     if (motion != motion_words_.end() && static_cast<std::size_t>(*motion) == k) {
       ++motion;
       continue;
     }
-    std::uint64_t word;
-    std::memcpy(&word, &record[k], sizeof word);
-    sum = (sum ^ word) * 1099511628211u;
-    sum ^= sum >> 29;
+    sum.add(record[k]);
   }
-  return sum;
+  return sum.value();
 }
 
 void ShownBed::show() {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "input_error.h"
+#include "word_sum.h"
 
 namespace solidcull {
 namespace {
@@ -28,16 +29,11 @@ enum Header {
 };
 constexpr std::size_t check_sum_size = 2;
 
-/// Of the numbers' bits (FNV-1a by words), in two halves that doubles hold exactly.
+/// In two halves that doubles hold exactly.
 std::array<double, check_sum_size> check_sum(const double* numbers, std::size_t n) {
-  std::uint64_t sum = 14695981039346656037u;
-  for (std::size_t k = 0; k < n; ++k) {
-    std::uint64_t word;
-    std::memcpy(&word, numbers + k, sizeof word);
-    sum = (sum ^ word) * 1099511628211u;
-    sum ^= sum >> 32;
-  }
-  return {static_cast<double>(sum >> 32), static_cast<double>(sum & 0xffffffffu)};
+  WordSum sum;
+  for (std::size_t k = 0; k < n; ++k) sum.add(numbers[k]);
+  return {static_cast<double>(sum.value() >> 32), static_cast<double>(sum.value() & 0xffffffffu)};
 }
 
 constexpr const char* damaged = "the restart file is damaged where it holds this fix's granules: use another one";
