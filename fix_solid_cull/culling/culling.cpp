@@ -99,7 +99,7 @@ void Culling::set_up_atoms() {
     p_.snapshot.take_up();
     count_restored();
     p_.shown.show();  // this deck may hold or drive what the one before did not
-    p_.shown.hide();
+    hide_guests();
   }
   const bool other_walls = p_.walls.walls_are_others();
   take_changes(other_walls);
@@ -265,10 +265,24 @@ void Culling::show_bed() {
   p_.ports.atoms.publish_counts(p_.census.stored());
 }
 
+bool Culling::culls_of(int groups) const {
+  if (!p_.census.something_locked()) return false;
+  int culled = p_.shown.shown() ? ~0 : p_.exchange.stored_groups();
+  const Atoms& atoms = p_.ports.atoms;
+  for (int i = 0; i < atoms.owned; ++i)
+    if (p_.shell.locked(i)) culled |= atoms.groups[i];
+  return p_.ports.ranks.any((culled & groups) != 0);
+}
+
 void Culling::hide_bed() {
   if (!p_.shown.shown()) return;
-  p_.shown.hide();
+  hide_guests();
   p_.ports.atoms.publish_counts(-p_.census.stored());
+}
+
+void Culling::hide_guests() {
+  p_.shown.hide();
+  p_.exchange.set_stored_groups(p_.shown.groups_of_guests());
 }
 
 /// What the deck did to culled granules between runs.
@@ -540,6 +554,14 @@ void Culling::check_inserted() {
 double Culling::largest_radius(int type) const {
   const std::vector<double>& largest = p_.solid.largest_radius_by_type();
   return type >= 0 && type < static_cast<int>(largest.size()) ? largest[static_cast<std::size_t>(type)] : 0.0;
+}
+
+const std::map<int, InterfaceMesh>& Culling::interface_meshes() {
+  const bool stand_in = p_.shown.shown() && !p_.meshes.follow_bodies();
+  if (stand_in) p_.shown.stand_in_for_missing(p_.arrivals);
+  const auto& meshes = p_.files.ask_meshes();
+  if (stand_in) p_.arrivals.clear();
+  return meshes;
 }
 
 std::vector<double> Culling::restart_state() {

@@ -40,6 +40,8 @@ class Culling {
   // --- between runs
   /// All granules are atoms, as in the unculled deck, until hide_bed(); nothing if they are already, or none is culled.
   void show_bed();
+  /// Whether a culled granule may be in one of these engine groups (bits). Collective.
+  bool culls_of(int groups) const;
   /// What was culled and not changed is culled again; what was changed wakes when the run begins.
   void hide_bed();
   bool bed_is_shown() const { return p_.shown.shown(); }      ///< local
@@ -48,12 +50,12 @@ class Culling {
   std::int64_t restore_all();
 
   // --- state
-  double value(int n) { return p_.report.value(n); }                                        ///< f_ID[n + 1]
-  const std::map<int, InterfaceMesh>& interface_meshes() { return p_.files.ask_meshes(); }  ///< local
-  double largest_radius(int type) const;  ///< of what is or was stored (m). Local
-  void enclose_stored(Box& box) const;    ///< the box must not be smaller. Local
-  double memory_bytes() const;            ///< local
-  std::vector<double> restart_state();    ///< on rank 0; the first number is how many
+  double value(int n) { return p_.report.value(n); }       ///< f_ID[n + 1]
+  const std::map<int, InterfaceMesh>& interface_meshes();  ///< by body; between runs, as the last run left them. Local
+  double largest_radius(int type) const;                   ///< of what is or was stored (m). Local
+  void enclose_stored(Box& box) const;                     ///< the box must not be smaller. Local
+  double memory_bytes() const;                             ///< local
+  std::vector<double> restart_state();                     ///< on rank 0; the first number is how many
   void read_restart_state(const char* bytes) { p_.snapshot.read(Snapshot::from_bytes(bytes)); }  ///< local
 
   // --- what follows the engine's atoms; local
@@ -93,6 +95,7 @@ class Culling {
   void count_restored();
   void publish(const MembershipChange& c);
   void fit_memory();
+  void hide_guests();
 
   CullingParts p_;
   Phase phase_ = Phase::between_runs;

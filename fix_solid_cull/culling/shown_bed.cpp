@@ -84,12 +84,20 @@ void ShownBed::note(int i, bool stored, std::uint64_t sum) {
                        atoms.mass[i], atoms.type[i], sum});
 }
 
+void ShownBed::stand_in_for_missing(Arrivals& arrivals) const {
+  for (std::size_t k = 0; k < interface_.size(); ++k) {
+    const Locked& e = interface_[k].state;
+    arrivals[granules_[k].tag] = {{e.body, e.place}, granules_[k].mass, granules_[k].radius, e.held};
+  }
+}
+
 // ------------------------------------------------------------------------------------------------------------ back
 
 void ShownBed::hide() {
   Atoms& atoms = ports_.atoms;
   changes_.clear();
   asking_.clear();
+  groups_of_guests_ = 0;
   std::vector<int> at(granules_.size(), gone);
   bring_strangers_home(at);
   for (std::size_t k = 0; k < granules_.size(); ++k) judge(k, at[k]);
@@ -176,7 +184,10 @@ void ShownBed::judge(std::size_t number, int i) {
   // what walls and cover knew of an interface granule does not come back with it from another rank
   const bool changed = !is_as_shown(s, i) || (s.has_been_away && !s.stored);
   if (changed || !atoms.may_be_culled(i)) wakes();  // or the deck holds or drives it from now on
-  if (s.stored) atoms.mark_interface(i, true);      // as it went into the store
+  if (s.stored) {
+    groups_of_guests_ |= atoms.groups[i];
+    atoms.mark_interface(i, true);  // as it went into the store
+  }
   if (changed || s.stored) {
     int layout = 0;
     atoms.pack(i, record_, layout);

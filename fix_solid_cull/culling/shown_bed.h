@@ -7,6 +7,7 @@
 
 #include "atom_index.h"
 #include "body_groups.h"
+#include "granule_masses.h"
 #include "per_granule.h"
 #include "ports.h"
 #include "shell.h"
@@ -26,8 +27,12 @@ class ShownBed : public FollowsAtoms {
   bool shown() const { return shown_; }
   /// Contact histories are up to date, and there are no ghosts. Local.
   void show();
+  /// The interface granules as they were shown: commands may have deleted some or sent them elsewhere. Local.
+  void stand_in_for_missing(Arrivals& arrivals) const;
   /// Guests go; what was changed asks to wake. Collective.
   void hide();
+  /// All engine groups, as bits, of the guests that hide() saw. Local.
+  int groups_of_guests() const { return groups_of_guests_; }
   /// Whether hide() found changes that wait for give_changes(), on any rank.
   bool changed() const { return changed_; }
   /// After the membership change in which they woke: granules have what the deck gave them, or are deleted. Collective.
@@ -84,6 +89,7 @@ class ShownBed : public FollowsAtoms {
   WakeRequests& wake_;
 
   bool shown_ = false, changed_ = false;
+  int groups_of_guests_ = 0;
   std::vector<Name> names_;           // by atom
   std::vector<Shown> granules_;       // by number
   std::vector<Interface> interface_;  // by number: the first ones are interface granules

@@ -38,6 +38,7 @@ void StoreExchange::put_away(int i) {
   const bool turns = ports_.contacts.turn_granules;
   atoms.set_velocity(i, e.velocity);
   if (turns) atoms.set_spin(i, e.spin);  // else it is its own, and goes on in the store
+  stored_groups_ |= atoms.groups[i];
   ports_.contacts.clear_histories(i);
   if (scales_.compact()) atoms.wrap(i);  // the box and the place tell which image: no word is kept for it
   std::vector<double> record;

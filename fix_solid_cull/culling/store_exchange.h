@@ -32,6 +32,10 @@ class StoreExchange {
   void put_away(int i);
   /// The granule is an interface granule again, where its body is; returns its index.
   int bring_back(std::int64_t tag);
+  /// All engine groups, as bits, that a granule that went in is in; of what came out again too, until they are counted anew.
+  /// Local.
+  int stored_groups() const { return stored_groups_; }
+  void set_stored_groups(int groups) { stored_groups_ = groups; }
   /// A membership change begins: what the store keeps for the step in which granules went in is forgotten once that step is over.
   /// Returns bytes that were freed.
   std::size_t begin_change();
@@ -50,6 +54,7 @@ class StoreExchange {
   WallSurvey& walls_;
   Cover& cover_;
   const Grounding& grounding_;
+  int stored_groups_ = 0;
   std::int64_t stored_at_ = never;  // step in which granules last went into the store
   std::vector<int> motion_words_;   // of a record: what is of no worth once that step has passed
 };

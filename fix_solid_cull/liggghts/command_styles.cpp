@@ -132,6 +132,14 @@ Sight sight_of(const std::string& command, const std::vector<std::string>& words
   return *found.name == 0 && !engine_has_it ? nothing : found.sight;
 }
 
+std::string only_group_of(const std::string& command, const std::vector<std::string>& words) {
+  const auto evaluates = [](const std::string& w) { return is_one_of(w.substr(0, 2), {"v_", "c_", "f_"}); };
+  if (words.size() < 2 || std::any_of(words.begin(), words.end(), evaluates)) return "";
+  if (command == "set" && words[0] == "group") return words[1];
+  if (command == "velocity" && words[1] == "set") return words[0];  // other words count all granules, or their temperature
+  return "";
+}
+
 bool reads_granules(const std::string& formula) {
   const auto in_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
   for (std::size_t at = 0; at < formula.size();) {

@@ -11,6 +11,7 @@
 #include "deck_rules.h"
 #include "error.h"
 #include "fix_solid_cull.h"
+#include "group.h"
 #include "lammps.h"
 #include "modify.h"
 #include "neigh_request.h"
@@ -58,6 +59,13 @@ void compute_again(LAMMPS_NS::LAMMPS* lmp) {
   modify->clearstep_compute();
 }
 
+/// Whether no culled granule is in the only group on which the command acts.
+bool leaves_culled_alone(LAMMPS_NS::LAMMPS* lmp, FixSolidCull& fix, const std::string& group) {
+  if (group.empty()) return false;
+  const int number = lmp->group->find(group.c_str());
+  return number >= 0 && !fix.culls_of(lmp->group->bitmask[number]);
+}
+
 void show(LAMMPS_NS::LAMMPS* lmp, FixSolidCull& fix) {
   if (fix.show_bed()) compute_again(lmp);
 }
@@ -94,14 +102,15 @@ bool is_own_line(const char* command, char** words, int n) {
 MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, char** words, int& n) : lmp_(lmp) {
   if (!lmp->modify) return;
   FixSolidCull* fix = fix_of(lmp);
-  Sight sight = sight_of(command, std::vector<std::string>(words, words + n), added);
+  const std::vector<std::string> line(words, words + n);
+  Sight sight = sight_of(command, line, added);
   if (is_own_line(command, words, n)) sight = fix ? Sight::all_restored : Sight::nothing;
   const bool reads = sight == Sight::whole_bed || sight == Sight::all_restored;
   if (reads) refuse_part_of_a_bed(lmp, fix, std::string("before '") + command + "'");
   if (sight == Sight::run && (lists_are_void(lmp) || (fix && has_commands(words, n)))) set_up_after_all(words, n);
   if (fix && !fix->in_run()) {
     if (sight == Sight::state) fix->hide_bed();
-    if (sight == Sight::whole_bed) show(lmp, *fix);
+    if (sight == Sight::whole_bed && !leaves_culled_alone(lmp, *fix, only_group_of(command, line))) show(lmp, *fix);
     if (sight == Sight::all_restored) fix->restore_all(command);
   }
   histories_stay = lists_are_void(lmp) && std::strcmp(command, "delete_atoms") == 0;

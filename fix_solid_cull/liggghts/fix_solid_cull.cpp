@@ -221,6 +221,10 @@ bool FixSolidCull::show_bed() {
   });
 }
 
+bool FixSolidCull::culls_of(int groups) {
+  return hand_on([&] { return culling_->culls_of(groups); });
+}
+
 void FixSolidCull::hide_bed() {
   hand_on([&] { culling_->hide_bed(); });
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "atom.h"
 #include "engine.h"
 #include "lammps.h"
 #include "neighbor.h"
@@ -172,6 +173,53 @@ TEST(ShortRuns, FetchNothingFromWallsThatAreAsTheyWere) {
   EXPECT_GT(interior(e), 0.9 * stored);
   e.run("unfix x2\nrun 200\n");
   EXPECT_GT(e.vector("cull", 7), restored + 50) << "what leant on it wakes";
+}
+
+TEST(CommandsOnAGroup, LeaveTheBedWhereNothingCulledIsInIt) {
+  Engine e;
+  e.run(read_bed(bed()) + fix_line + looks);
+  e.run("create_atoms 1 single 0.013 0.013 0.05 units box\ngroup new id > 1300\nset group new diameter 0.0026 density 2500\n");
+  e.run("group some id < 400\nrun 20\n");
+  const double stored = interior(e), atoms = static_cast<double>(e.lammps()->atom->natoms);
+  ASSERT_GT(stored, 300);
+  e.run("set group new density 3000\nvelocity new set 0 0 -0.1\n");
+  EXPECT_EQ(e.lammps()->atom->natoms, atoms);
+  const State state = e.state();
+  const Granule& newest = state.rbegin()->second;
+  EXPECT_GT(state.rbegin()->first, 1300);
+  EXPECT_EQ(newest.v[2], -0.1);
+  EXPECT_NEAR(newest.mass, 3000 * 3.14159265358979 / 6 * std::pow(diameter, 3), 1e-12 * newest.mass);
+  e.run("set group some density 2500\n");
+  EXPECT_EQ(e.lammps()->atom->natoms, atoms + stored) << "a group that was made while its granules were culled";
+  e.run("run 20\n");
+  EXPECT_GT(interior(e), 0.9 * stored);
+  EXPECT_EQ(e.lammps()->atom->natoms, atoms + stored - interior(e));
+  e.run("variable up atom z*count(all)\nset group new vx v_up\n");  // a formula may count them
+  EXPECT_EQ(e.lammps()->atom->natoms, atoms + stored);
+}
+
+TEST(TheInterfaceMesh, IsBetweenRunsAsTheLastRunLeftIt) {
+  Engine whole, dug;
+  for (Engine* e : {&whole, &dug}) e->run(read_bed(bed()) + fix_line + looks);
+  const std::string ask = "region solid interface/mesh cull\ngroup inside region solid\n";
+  whole.run(ask);
+  dug.run("group few id < 700\ndelete_atoms group few compress no\n" + ask);
+  const State a = whole.state(), b = dug.state();
+  const int in_a = whole.group_bit("inside"), in_b = dug.group_bit("inside");
+  int both = 0, deleted = 0;
+  for (const auto& [tag, granule] : a) {
+    const bool inside = (granule.mask & in_a) != 0;
+    const auto left = b.find(tag);
+    if (left == b.end()) {
+      deleted += inside;
+      continue;
+    }
+    both += inside;
+    EXPECT_EQ((left->second.mask & in_b) != 0, inside) << "granule " << tag;
+  }
+  EXPECT_GT(both, 100);
+  EXPECT_GT(deleted, 100);
+  dug.run("run 20\nunfix cull\n");
 }
 
 const std::string left_half = "region left block INF 0.013 INF INF INF INF units box\n";
