@@ -102,6 +102,7 @@ void Culling::set_up_atoms() {
     hide_guests();
   }
   const bool other_walls = p_.walls.walls_are_others();
+  if (other_walls) granules_may_change();
   take_changes(other_walls);
   p_.closure.begin_run(other_walls);
   open_for_insertion();
@@ -127,6 +128,8 @@ void Culling::initial_step() {
   const std::int64_t step = p_.ports.run.step;
   if (p_.ports.ranks.any(p_.wake.any_here())) ask_for_build(step);
   p_.pacing.begin_run(step, p_.census.something_locked());
+  if (p_.ports.ranks.any(proposal_dropped_)) p_.pacing.look_earlier(step);
+  proposal_dropped_ = false;
 }
 
 // ------------------------------------------------------------------------------------------------------------ a time step
@@ -263,6 +266,11 @@ void Culling::show_bed() {
   p_.lost.remember();
   p_.shown.show();
   p_.ports.atoms.publish_counts(p_.census.stored());
+}
+
+void Culling::granules_may_change() {
+  proposal_dropped_ = proposal_dropped_ || proposal_.any_here();
+  proposal_ = {};
 }
 
 bool Culling::culls_of(int groups) const {

@@ -40,6 +40,8 @@ class Culling {
   // --- between runs
   /// All granules are atoms, as in the unculled deck, until hide_bed(); nothing if they are already, or none is culled.
   void show_bed();
+  /// A command may do anything to granules: what the last look chose to be culled is not known to rest any more. Local.
+  void granules_may_change();
   /// Whether a culled granule may be in one of these engine groups (bits). Collective.
   bool culls_of(int groups) const;
   /// What was culled and not changed is culled again; what was changed wakes when the run begins.
@@ -100,6 +102,7 @@ class Culling {
   CullingParts p_;
   Phase phase_ = Phase::between_runs;
   Proposal proposal_;                // of the last look, until the next change
+  bool proposal_dropped_ = false;
   bool inner_pairs_listed_ = false;  // the neighbour lists are new: pairs within bodies stand in them
   bool open_for_insertion_ = false;  // a fix will insert: stored granules must make way in the next change
   bool told_of_file_ = false;        // that restart files of this run hold more than atoms

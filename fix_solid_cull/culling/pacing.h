@@ -42,6 +42,8 @@ class Pacing {
     benefit_ = CullingBenefit();
     told_no_benefit_ = false;
   }
+  /// What the last look chose was dropped. A deck whose runs end with a look each would never cull: this run looks earlier.
+  void look_earlier(std::int64_t step) { next_look_ = std::min(next_look_, step + every() / 2); }
   /// The scales were found in the middle of a run: the first look is one interval away.
   void begin_within_run(std::int64_t step) { next_look_ = step + every(); }
 

@@ -110,6 +110,7 @@ MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, 
   if (sight == Sight::run && (lists_are_void(lmp) || (fix && has_commands(words, n)))) set_up_after_all(words, n);
   if (fix && !fix->in_run()) {
     if (sight == Sight::state) fix->hide_bed();
+    if (sight == Sight::whole_bed) fix->granules_may_change();
     if (sight == Sight::whole_bed && !leaves_culled_alone(lmp, *fix, only_group_of(command, line))) show(lmp, *fix);
     if (sight == Sight::all_restored) fix->restore_all(command);
   }

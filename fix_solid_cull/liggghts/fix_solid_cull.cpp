@@ -221,6 +221,10 @@ bool FixSolidCull::show_bed() {
   });
 }
 
+void FixSolidCull::granules_may_change() {
+  hand_on([&] { culling_->granules_may_change(); });
+}
+
 bool FixSolidCull::culls_of(int groups) {
   return hand_on([&] { return culling_->culls_of(groups); });
 }

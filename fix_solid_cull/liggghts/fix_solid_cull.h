@@ -70,6 +70,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   /// True if the bed was not shown before, and is now.
   bool show_bed();
   bool culls_of(int groups);
+  void granules_may_change();
   void hide_bed();
   void restore_all(const char* command);
   /// The deck counts its steps anew, so much higher.

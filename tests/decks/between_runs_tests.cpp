@@ -222,6 +222,19 @@ TEST(TheInterfaceMesh, IsBetweenRunsAsTheLastRunLeftIt) {
   dug.run("run 20\nunfix cull\n");
 }
 
+TEST(WhatALookChose, IsNotCulledWhereTheDeckHasChangedGranulesSince) {
+  Engine left_alone, never, culled;
+  left_alone.run(read_bed(bed()) + fix_line + "run 100\nrun 0\n");
+  for (Engine* e : {&never, &culled}) e->run(read_bed(bed()) + (e == &never ? "" : fix_line) + "run 100\n");
+  ASSERT_EQ(interior(culled), 0);
+  ASSERT_GT(interior(left_alone), 300) << "the last look chose nothing";
+  for (Engine* e : {&never, &culled}) e->run("set group all diameter 0.0022\nrun 5\n");
+  EXPECT_EQ(culled.vector("cull", 2) + interior(culled), 0) << "they have no contacts any more";
+  for (Engine* e : {&never, &culled}) e->run("run 100\n");
+  culled.run("unfix cull\nrun 0\n");
+  EXPECT_LE(largest_difference(never.state(), culled.state(), &Granule::x), 1e-9 * diameter);
+}
+
 const std::string left_half = "region left block INF 0.013 INF INF INF INF units box\n";
 const std::string inner = "region inner block 0.008 0.018 0.008 0.018 0.004 0.012 units box\n";
 const std::string counts =
