@@ -258,5 +258,12 @@ TEST(Pacing, looks_rest_while_culling_waits_but_for_a_glance_now_and_then) {
   EXPECT_TRUE(deck.pacing.due(1010));  // what is culled is watched
 }
 
+TEST(Pacing, where_a_choice_was_dropped_a_look_comes_early_in_the_run) {
+  Deck deck(16);
+  deck.pacing.begin_run(17, true);
+  deck.pacing.look_earlier(17);
+  EXPECT_EQ(deck.looks(17, 64), (Steps{25, 32, 48, 64}));
+}
+
 }  // namespace
 }  // namespace solidcull
