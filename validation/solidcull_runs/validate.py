@@ -1,0 +1,105 @@
+"""validation/run.sh [--quick|--full] [--report-only] [--at-once N] [CASE ...]
+
+Runs cases, unculled and culled, and writes the report. What was run before, with the same deck and the same fix, is not run again:
+after a kill the same command goes on. `--few-steps`: each deck once unculled and once culled, cut short by its variables `few`.
+Exit: 0 the report is written and nothing is lost, 1 a granule is lost, 2 a case or run failed (one line each).
+"""
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from . import cases, engine, ensembles, errors, figures, report
+from .dumps import read_final
+from .errors import RunError
+from .points import SLEEP, UNCULLED
+from .twins import cores
+
+HERE = Path(__file__).resolve().parents[1]
+
+
+def options(argv):
+    p = argparse.ArgumentParser(prog="validation/run.sh", description="run time against error of all cases")
+    p.add_argument("case", nargs="*", help=f"default: all ({', '.join(cases.names())})")
+    size = p.add_mutually_exclusive_group()
+    size.add_argument("--quick", action="store_const", dest="size", const="quick", help="about 6,000 granules a case (default)")
+    size.add_argument("--full", action="store_const", dest="size", const="full", help="20,000 granules a case and more: hours")
+    p.add_argument("--report-only", action="store_true", help="run nothing; write the report of the results that there are")
+    p.add_argument("--at-once", type=int, default=cores(), metavar="N", help="runs at the same time (default: one a core)")
+    p.add_argument("--out", type=Path, default=HERE / "out", metavar="FOLDER", help="beds, logs and results")
+    p.add_argument("--report", type=Path, default=None, metavar="FOLDER", help="default: validation/report/SIZE")
+    p.set_defaults(size="quick")
+    a = p.parse_args(argv)
+    if a.at_once < 1:
+        p.error("--at-once takes 1 or more")
+    return a
+
+
+def say(line):
+    print(line, flush=True)
+
+
+def run_case(case, out, beds, launcher, fix, at_once):
+    """Runs it and leaves its results; the lines of what failed."""
+    jobs = ensembles.jobs_of(case, out, beds, launcher, fix)
+    done = ensembles.run_all(jobs, at_once, say)
+    result = ensembles.result_of(case, done)
+    draw(case, done, out / case.name / "what_moves.png")
+    file = ensembles.results_file(out, case)
+    part = file.with_suffix(".part")
+    part.write_text(json.dumps(result) + "\n")
+    part.rename(file)
+    return [f"{case.name}: {f['run']}: {f['why']}" for f in result["failed"]]
+
+
+def draw(case, done, file):
+    """The picture of what moves, of the first unculled and the first culled run."""
+    framed = {job.point.family: job for job, run in done.items() if job.frames and not isinstance(run, str)}
+    if UNCULLED not in framed or SLEEP not in framed:
+        return
+    final = read_final(framed[UNCULLED].file(".final"))
+    diameter = 2 * float(sorted(final["radius"])[len(final) // 2])
+    axis, share, largest = case.get("picture", ("y", 0.5, float("inf")))
+    figures.what_moves(framed[UNCULLED].file(".frames"), framed[SLEEP].file(".frames"), file, diameter, ("xyz".index(axis), share), largest)
+
+
+def run(a):
+    out = a.out / a.size
+    wanted = cases.load(a.case, a.size)
+    failed = []
+    if not a.report_only:
+        launcher = engine.find_launcher()
+        fix = ensembles.fix_hash(launcher)
+        beds = ensembles.make_beds(wanted, out, a.at_once, say)
+        for case in wanted:
+            try:
+                failed += run_case(case, out, beds, launcher, fix, a.at_once)
+            except RunError as e:
+                failed.append(str(e))
+                say(f"{case.name}: {e}")
+    results = []
+    for case in wanted if a.case else cases.load([], a.size):
+        file = ensembles.results_file(out, case)
+        if file.exists():
+            results.append(report.read_result(file))
+        elif a.report_only:
+            say(f"{case.name} has no results; run it first")
+    folder = a.report or HERE / "report" / a.size
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    report.write(results, folder, out, f"Made by `validation/run.sh --{a.size}`.")
+    say(f"report: {folder / 'README.md'} and {folder / 'report.html'}")
+    for line in failed:
+        print(f"validate: {line}", file=sys.stderr)
+    return 2 if failed else int(any(r["lost"] for r in results))
+
+
+def main(argv=None):
+    try:
+        return errors.status_of("validate", lambda: run(options(argv)))
+    except KeyboardInterrupt:
+        print("validate: stopped; the same command goes on from here", file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())
