@@ -28,8 +28,8 @@ INTEGRATOR = re.compile(r"^fix\s+(\S+)\s+all\s+nve/sphere\s*$", re.M)
 def frozen_by_hand(text, region, where):
     """A deck in which what is outside the region is neither integrated nor in neighbour lists with its like."""
     lines = (f"region by_hand {region} units box\ngroup by_hand region by_hand\ngroup frozen subtract all by_hand\n"
-             "neigh_modify exclude group frozen frozen\nvelocity frozen set 0 0 0\nfix {} by_hand nve/sphere")
-    made, n = INTEGRATOR.subn(lambda found: lines.format(found[1]), text)
+             "neigh_modify exclude group frozen frozen\nvelocity frozen set 0 0 0\n")
+    made, n = INTEGRATOR.subn(lambda found: f"{lines}fix {found[1]} by_hand nve/sphere", text)
     if n != 1:
         raise RunError(f"{where} has {n} lines 'fix ID all nve/sphere'; to freeze by hand it must have one")
     return made

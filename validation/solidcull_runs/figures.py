@@ -41,7 +41,7 @@ def curves(result, file):
         for entry in scene["points"].values():
             if entry["default"] and entry["family"] != UNCULLED:
                 for k, r in enumerate(entry["runs"]):
-                    ax.plot(*r["curves"][name], color=COLOURS[entry["family"]], lw=0.9, label=None if k else f"`{entry['family']}`")
+                    ax.plot(*r["curves"][name], color=COLOURS[entry["family"]], lw=0.9, label=None if k else entry["family"])
         ax.set(xlabel="time (s)", ylabel=f"{name} ({units[name]})")
     axes[0].legend(fontsize=7)
     save(figure, file)
@@ -114,23 +114,26 @@ def all_cases(results, file):
 
 # ------------------------------------------------------------------------------------------------------------ what moves
 
-def busiest(file, diameter):
-    """Of the snapshots of an unculled run: the step with the most motion since the one before, its columns and rows, and how far each
-    granule had moved (mean diameters)."""
+def busiest(file, diameter, steps):
+    """Of the snapshots of an unculled run at these steps: the one with the most motion since the one before, its rows, and how far
+    each granule had moved (mean diameters)."""
     best, before = None, None
     for step, columns, rows in dumps.snapshots(file):
         rows = rows[np.argsort(rows[:, 0])]
         if before is not None and len(before) == len(rows):
             way = np.linalg.norm(rows[:, 1:4] - before[:, 1:4], axis=1) / diameter
             count = int((way > 1e-2).sum())
-            if best is None or count > best[0]:
+            if step in steps and (best is None or count > best[0]):
                 best = count, step, rows, way
         before = rows
     return best and best[1:]
 
 
-def snapshot(file, step):
-    return next((rows for s, _, rows in dumps.snapshots(file) if s == step), None)
+def when_culled(file):
+    """The snapshots of a culled run in which something is stored, by step; all where nothing ever is."""
+    rows_of = {step: rows for step, _, rows in dumps.snapshots(file)}
+    most = max(map(len, rows_of.values()))
+    return {step: rows for step, rows in rows_of.items() if len(rows) < most} or rows_of
 
 
 def last_seen(file, step, ids):
@@ -155,7 +158,10 @@ def what_moves(unculled, culled, file, diameter, cut=(1, 0.5), largest=np.inf):
     """A slice of the bed when it moves most: how far granules moved in the unculled run, and what the culled run holds as what.
     `unculled`, `culled`: files of snapshots; `cut`: axis and share of the box; `largest`: radii above are drawn dark. False without
     snapshots."""
-    found = busiest(unculled, diameter) if unculled.exists() else None
+    if not (unculled.exists() and culled.exists()):
+        return False
+    stored = when_culled(culled)
+    found = busiest(unculled, diameter, stored)
     if not found:
         return False
     step, rows, way = found
@@ -171,18 +177,17 @@ def what_moves(unculled, culled, file, diameter, cut=(1, 0.5), largest=np.inf):
     shade[rows[:, 4] > largest] = (0.3, 0.3, 0.33, 1)
     discs(panels[0], rows[near], shade[near], axes)
     panels[0].set_title("unculled: way since the last snapshot, 1e-4 d (dark) to d (bright)", fontsize=8)
-    then = snapshot(culled, step) if culled.exists() else None
-    if then is not None:
-        away = last_seen(culled, step, np.setdiff1d(rows[:, 0], then[:, 0]))
-        state = np.concatenate([np.where(then[:, 5] > 0, 1, 0), np.full(len(away), 2)])
-        both = np.vstack([then[:, :5], away[:, :5]]) if len(away) else then[:, :5]
-        distance = np.abs(both[:, 1 + axis] - middle)
-        near = np.flatnonzero(distance < np.maximum(0.75 * diameter, both[:, 4]))
-        near = near[np.argsort(-distance[near])]
-        shade = np.array([STATES[s][1] for s in state])
-        shade[both[:, 4] > largest] = (0.3, 0.3, 0.33)
-        discs(panels[1], both[near], shade[near], axes)
-    panels[1].set_title("`sleep`: exterior tan, interface blue, interior green", fontsize=8)
+    then = stored[step]
+    away = last_seen(culled, step, np.setdiff1d(rows[:, 0], then[:, 0]))
+    state = np.concatenate([np.where(then[:, 5] > 0, 1, 0), np.full(len(away), 2)])
+    both = np.vstack([then[:, :5], away[:, :5]]) if len(away) else then[:, :5]
+    distance = np.abs(both[:, 1 + axis] - middle)
+    near = np.flatnonzero(distance < np.maximum(0.75 * diameter, both[:, 4]))
+    near = near[np.argsort(-distance[near])]
+    shade = np.array([STATES[s][1] for s in state])
+    shade[both[:, 4] > largest] = (0.3, 0.3, 0.33)
+    discs(panels[1], both[near], shade[near], axes)
+    panels[1].set_title("sleep: exterior tan, interface blue, interior green", fontsize=8)
     for ax in panels:
         ax.set(aspect="equal", xlim=np.percentile(rows[:, 1 + axes[0]], [0, 100]) + np.array([-1, 1]) * diameter,
                ylim=np.percentile(rows[:, 1 + axes[1]], [0, 100]) + np.array([-1, 1]) * diameter)

@@ -20,9 +20,8 @@ def files(folder, v):
 
 
 def measure(run, v):
-    (_, t), (_, depth), (_, speed) = run.series("time"), run.series("v_depth"), run.series("c_fall")
-    (_, force), (_, floor) = run.series("v_force"), run.series("v_floor")
-    stopped = np.flatnonzero(np.abs(speed) > 0.05 * abs(speed[0]))[-1]
+    t, depth, force, floor = (run.series(c)[1] for c in ("time", "v_depth", "v_force", "v_floor"))
+    stopped = np.argmax(depth >= 0.95 * depth.max())
     bed, start = (g[g["radius"] < 0.004] for g in (run.final, run.start))
     cell, size = 5e-4, (v["L"], v["W"])
     change = surfaces.height_map(bed, (0, 0), size, cell) - surfaces.height_map(start, (0, 0), size, cell)
