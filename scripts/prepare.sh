@@ -24,7 +24,7 @@ engine_library() {
 }
 packages=(cmake make g++ libopenvdb-dev libtbb-dev libboost-dev libeigen3-dev libgtest-dev zlib1g-dev ${SOLIDCULL_PACKAGES:-})
 if [ "${SOLIDCULL_ENGINE:=ON}" = ON ]; then
-  packages+=(python3 python3-numpy python3-matplotlib)
+  packages+=(python3 python3-numpy python3-scipy python3-matplotlib)
   case $(engine_library) in
     '' | *-NOTFOUND | /usr/lib/*/libliggghts.so) packages+=(liggghts libliggghts-dev libopenmpi-dev openmpi-bin) ;;
     *) command -v mpicxx >/dev/null || packages+=(libopenmpi-dev openmpi-bin) ;;

@@ -5,6 +5,6 @@
 # Exit status: 0 the report is written and nothing is lost, 1 a granule is lost, 2 a case failed (one line each).
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
-SOLIDCULL_PACKAGES=python3-scipy "$here/../scripts/prepare.sh" liggghts-solidcull
+"$here/../scripts/prepare.sh" liggghts-solidcull
 cd "$here"
 exec /usr/bin/python3 -m solidcull_runs.validate "$@"

@@ -1,7 +1,7 @@
-"""validation/run.sh [--quick|--full] [--report-only] [--at-once N] [CASE ...]
+"""validation/run.sh [--quick|--full] [--report-only|--few-steps] [--at-once N] [CASE ...]
 
 Runs cases, unculled and culled, and writes the report. What was run before, with the same deck and the same fix, is not run again:
-after a kill the same command goes on. `--few-steps`: each deck once unculled and once culled, cut short by its variables `few`.
+after a kill the same command goes on. `--few-steps`: each deck once unculled and once culled, cut short; no report.
 Exit: 0 the report is written and nothing is lost, 1 a granule is lost, 2 a case or run failed (one line each).
 """
 import argparse
@@ -9,7 +9,7 @@ import json
 import sys
 from pathlib import Path
 
-from . import cases, engine, ensembles, errors, figures, report
+from . import cases, engine, ensembles, errors, few, figures, report
 from .dumps import read_final
 from .errors import RunError
 from .points import SLEEP, UNCULLED
@@ -24,7 +24,9 @@ def options(argv):
     size = p.add_mutually_exclusive_group()
     size.add_argument("--quick", action="store_const", dest="size", const="quick", help="about 6,000 granules a case (default)")
     size.add_argument("--full", action="store_const", dest="size", const="full", help="20,000 granules a case and more: hours")
-    p.add_argument("--report-only", action="store_true", help="run nothing; write the report of the results that there are")
+    how = p.add_mutually_exclusive_group()
+    how.add_argument("--report-only", action="store_true", help="run nothing; write the report of the results that there are")
+    how.add_argument("--few-steps", action="store_true", help="each deck for a few steps: that all of it still runs")
     p.add_argument("--at-once", type=int, default=cores(), metavar="N", help="runs at the same time (default: one a core)")
     p.add_argument("--out", type=Path, default=HERE / "out", metavar="FOLDER", help="beds, logs and results")
     p.add_argument("--report", type=Path, default=None, metavar="FOLDER", help="default: validation/report/SIZE")
@@ -67,6 +69,10 @@ def run(a):
     out = a.out / a.size
     wanted = cases.load(a.case, a.size)
     failed = []
+    if a.few_steps:
+        for case in wanted:
+            failed += few.faults_of(case, a.out / "few", engine.find_launcher(), say)
+        return told(failed)
     if not a.report_only:
         launcher = engine.find_launcher()
         fix = ensembles.fix_hash(launcher)
@@ -88,9 +94,14 @@ def run(a):
     folder.parent.mkdir(parents=True, exist_ok=True)
     report.write(results, folder, out, f"Made by `validation/run.sh --{a.size}`.")
     say(f"report: {folder / 'README.md'} and {folder / 'report.html'}")
+    return told(failed) or int(any(r["lost"] for r in results))
+
+
+def told(failed):
+    """The exit status, after a line for each failure."""
     for line in failed:
         print(f"validate: {line}", file=sys.stderr)
-    return 2 if failed else int(any(r["lost"] for r in results))
+    return 2 if failed else 0
 
 
 def main(argv=None):

@@ -1,0 +1,282 @@
+"""The validation report's code: cases and their faults, statistics, fields, and a report of a small stored result.
+
+data/validation_result.json is the result of `validation/run.sh --quick slow_impact`, with every eighth point of its curves.
+"""
+import json
+import math
+import os
+import shutil
+import stat
+import statistics
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(ROOT / "validation"))
+from solidcull_runs import cases, ensembles, equivalence, few, fields, judgement, points, report, validate  # noqa: E402
+from solidcull_runs.errors import RunError  # noqa: E402
+
+STORED = ROOT / "tests" / "data" / "validation_result.json"
+README = """# A case
+
+**Claim.** It is
+the same.
+
+**Reference.** Itself.
+
+| metric | unit | margin | why |
+| --- | --- | --- | --- |
+| depth | m | 2 % | said so |
+| angle | deg | 0.5 | a protractor's |
+"""
+CASE = """
+deck, aside = "a.in", "aside"
+quick = full = {"granules": 3}
+curves = {"depth": "v_depth"}
+def measure(run, v):
+    return {"depth": run, "angle": 1}
+"""
+
+
+class Folder(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def refused(self, text, function, *args):
+        with self.assertRaises(RunError) as caught:
+            function(*args)
+        self.assertIn(text, str(caught.exception))
+        self.assertNotIn("\n", str(caught.exception))
+
+
+class Cases(Folder):
+    def case(self, readme=README, code=CASE, deck="fix cull all solid/cull\n"):
+        folder = self.folder / "cases" / "mine"
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in (("README.md", readme), ("case.py", code), ("a.in", deck)):
+            (folder / name).unlink(missing_ok=True)
+            if text is not None:
+                (folder / name).write_text(text)
+        return cases.Case(folder, "quick")
+
+    def test_what_a_folder_says(self):
+        case = self.case()
+        self.assertEqual((case.title, case.claim, case.reference), ("A case", "It is the same.", "Itself."))
+        self.assertEqual([(m.name, m.unit, m.margin, m.relative) for m in case.metrics], [("depth", "m", 0.02, True), ("angle", "deg", 0.5, False)])
+        self.assertEqual([m.allowed(-10) for m in case.metrics], [0.2, 0.5])
+        self.assertEqual(case.measured(7, ""), {"depth": 7.0, "angle": 1.0})
+
+    def test_what_a_folder_lacks(self):
+        self.refused("case mine has no README.md", self.case, None)
+        self.refused("case mine has no case.py", self.case, README, None)
+        self.refused("there is no deck a.in", self.case, README, CASE, None)
+        self.refused("has no paragraph '**Claim.**", self.case, README.replace("Claim", "Say"))
+        self.refused("has no table '| metric | unit | margin | why |'", self.case, README.replace("| metric", "| figure"))
+        self.refused("needs a metric, a unit, a margin (2 % or a number) and why", self.case, README.replace("0.5", "some"))
+        self.refused("needs a metric, a unit, a margin (2 % or a number) and why", self.case, README.replace("said so", ""))
+        self.refused("case.py has no 'measure'", self.case, README, CASE.replace("measure", "measures"))
+        self.refused("case.py has no 'quick'", self.case, README, CASE.replace("quick = ", ""))
+        self.refused("case.py cannot be read: NameError", self.case, README, CASE + "nothing\n")
+        self.refused("curves of depths, which the README's table does not name", self.case, README, CASE.replace('{"depth": "v', '{"depths": "v'))
+        self.refused("no case 'other'; there is: mine", cases.load, ["other"], "quick", self.folder / "cases")
+
+    def test_wrong_metrics(self):
+        for returned, said in (('{"depth": 1}', "gives no value for angle"), ('{"depth": run / 0, "angle": 1}', "ZeroDivisionError"),
+                               ('{"depth": float("nan"), "angle": 1}', "has no number for depth")):
+            with self.subTest(returned):
+                case = self.case(code=CASE.replace('{"depth": run, "angle": 1}', returned))
+                self.refused(said, case.measured, type("Run", (float,), {"name": "x"})(1), "")
+
+    def test_every_case_of_the_project_can_be_read(self):
+        there = cases.names()
+        self.assertGreaterEqual(len(there), 1)
+        for size in cases.SIZES:
+            for case in cases.load([], size):
+                with self.subTest(f"{case.name} {size}"):
+                    self.assertGreater(case.granules(case.main_scene), 0)
+                    self.assertTrue(case.get("aside"))
+                    bed = case.bed(case.main_scene)
+                    self.assertTrue(bed is None or bed[0].is_file(), bed)
+
+
+class Points(unittest.TestCase):
+    def test_the_sweep(self):
+        for size in cases.SIZES:
+            of_size = points.points(size)
+            self.assertEqual(len({p.name for p in of_size}), len(of_size))
+            self.assertEqual(points.runs_of(of_size[0], size), 5)
+            self.assertEqual({p.family for p in of_size}, set(points.FAMILIES))
+            self.assertEqual([p.name for p in of_size if p.default], ["unculled", "sleep 3 0", "live 3 0"])
+
+    def test_frozen_by_hand(self):
+        text = "read_restart a\nfix integrate all nve/sphere\nrun 5\n"
+        made = ensembles.frozen_by_hand(text, "sphere 0 0 0 $R", "deck")
+        self.assertEqual(made.splitlines()[1:-1], ["region by_hand sphere 0 0 0 $R units box", "group by_hand region by_hand",
+                                                   "group frozen subtract all by_hand", "neigh_modify exclude group frozen frozen",
+                                                   "velocity frozen set 0 0 0", "fix integrate by_hand nve/sphere"])
+        with self.assertRaises(RunError):
+            ensembles.frozen_by_hand("run 5\n", "sphere", "deck")
+
+    def test_cut_short(self):
+        self.assertEqual(few.cut_short("run 500\nrun ${steps} upto\nrun 0\nrun_time 5\n", 40), "run 40\nrun 40\nrun 0\nrun_time 5\n")
+
+
+class Statistics(unittest.TestCase):
+    def test_two_one_sided_tests(self):
+        a, b = [1.0, 1.1, 0.9, 1.05, 0.95], [1.02, 1.08, 0.99]
+        v = equivalence.judged(a, b, 0.2)
+        va, vb = statistics.variance(a) / 5, statistics.variance(b) / 3
+        freedom = (va + vb)**2 / (va**2 / 4 + vb**2 / 2)
+        self.assertAlmostEqual(freedom, 5.9823, 3)
+        half = 1.944 * math.sqrt(va + vb)  # Student's t of 95 % at 5.98 degrees of freedom, from a table: 1.943 at 6, 2.015 at 5
+        self.assertAlmostEqual(v.difference, 0.03, 12)
+        self.assertAlmostEqual(v.high - v.difference, half, 3)
+        self.assertEqual(v.word, equivalence.SAME)
+        self.assertEqual(equivalence.judged(a, b, 0.05).word, equivalence.OPEN)
+        self.assertEqual(equivalence.judged(a, [x + 1 for x in b], 0.2).word, equivalence.OTHER)
+        self.assertAlmostEqual(v.in_margins, 0.15, 12)
+
+    def test_scatter_is_no_equivalence(self):
+        """Runs that differ by nothing on average, but scatter by more than the margin, show nothing."""
+        self.assertEqual(equivalence.judged([0, 10, -10, 5, -5], [0, 10, -10], 1).word, equivalence.OPEN)
+        self.assertEqual(equivalence.judged([0, 10, -10, 5, -5], [0], 1).word, equivalence.OPEN)
+        self.assertEqual(equivalence.judged([1, 1, 1], [1, 1], 0.1).word, equivalence.SAME)
+        with self.assertRaises(ValueError):
+            equivalence.judged([1], [1], 1)
+
+    def test_order(self):
+        tolerances = [1, 3, 10, 30]
+        self.assertAlmostEqual(equivalence.order(tolerances, [0.1 * t**0.7 for t in tolerances], 0.0), 0.7, 12)
+        self.assertIsNone(equivalence.order(tolerances, [0.1, 0.1, 0.1, 0.5], 0.2))
+        self.assertAlmostEqual(equivalence.order(tolerances, [0.1, 0.1, 1, 3], 0.2), 1, 12)
+
+
+class Fields(unittest.TestCase):
+    def bed(self, shift=0.0, n=400):
+        rng = np.random.default_rng(3)
+        g = np.zeros(n, [(c, float) for c in ensembles.COLUMNS])
+        for c in "xyz":
+            g[c] = rng.uniform(0, 0.03, n)
+        g["x"] += shift
+        g["radius"], g["vx"] = 1e-3, 0.2
+        g["mass"] = 2500 * 4 / 3 * np.pi * 1e-9
+        g["c_twin_stress[3]"] = -2e-6
+        return g
+
+    def test_sums_are_kept(self):
+        g, width = self.bed(), 3e-3
+        solid, velocity, stress = fields.fields(g, np.full(3, -0.02), np.full(3, 0.05), width)
+        cell = width**3
+        self.assertAlmostEqual(solid.sum() * cell / (400 * 4 / 3 * np.pi * 1e-9), 1, 6)
+        self.assertAlmostEqual(velocity[0].sum() / solid.sum(), 0.2, 9)
+        self.assertAlmostEqual(stress[2].sum() * cell / (400 * 2e-6), 1, 6)
+
+    def test_distance(self):
+        same = fields.distances([self.bed()], [self.bed(), self.bed()])
+        self.assertEqual([d["error"] for d in same.values()], [0, 0, 0])
+        apart = fields.distances([self.bed(0.01)], [self.bed(), self.bed()])
+        self.assertGreater(apart["solid fraction"]["error"], 0.3)
+        self.assertEqual(apart["solid fraction"]["noise"], 0)
+
+
+class Report(Folder):
+    def stored(self):
+        return report.read_result(STORED)
+
+    def test_of_a_stored_result(self):
+        result = self.stored()
+        folder = self.folder / "report"
+        report.write([result], folder, None, "From a test.")
+        text, page = (folder / "README.md").read_text(), (folder / "report.html").read_text()
+        judged = judgement.judge(result)
+        sleep = judged["sleep 3 0"]
+        self.assertIn(f"| {sleep.speed_up:.2f} | {sleep.error:.2f} ({sleep.worst}) | {sleep.word} |", text)
+        for part in ("Slow impact craters", "frozen by hand", "depth ~ density^p", "solid fraction", "error ~ tolerance^p"):
+            self.assertIn(part, text)
+        for picture in ("all.png", "slow_impact-curves.png", "slow_impact-error.png"):
+            self.assertIn(f"]({picture})", text)
+            self.assertGreater((folder / picture).stat().st_size, 5000, picture)
+        self.assertEqual(page.count("data:image/png;base64,"), 3)
+        self.assertNotIn("src=\"slow", page)
+        self.assertFalse((self.folder / "report.part").exists())
+
+    def test_judged_as_by_hand(self):
+        result = self.stored()
+        scene = judgement.main_scene(result)
+        u = [r["values"]["depth"] for r in scene["points"]["unculled"]["runs"]]
+        c = [r["values"]["depth"] for r in scene["points"]["sleep 3 0"]["runs"]]
+        j = judgement.judge(result)["sleep 3 0"]
+        self.assertAlmostEqual(j.verdicts["depth"].in_margins, abs(statistics.fmean(c) - statistics.fmean(u)) / (0.02 * statistics.fmean(u)), 9)
+        self.assertAlmostEqual(j.of_unculled, statistics.median(r["seconds"] for r in scene["points"]["sleep 3 0"]["runs"])
+                               / statistics.median(r["seconds"] for r in scene["points"]["unculled"]["runs"]), 12)
+
+    def test_too_few_runs_are_not_judged(self):
+        result = self.stored()
+        for entry in judgement.main_scene(result)["points"].values():
+            entry["runs"] = entry["runs"][:1]
+        self.assertEqual(judgement.judge(result), {})
+        report.write([result], self.folder / "report")
+        self.assertIn("There are too few runs to judge.", (self.folder / "report" / "README.md").read_text())
+
+    def test_wrong_files(self):
+        file = self.folder / "results.json"
+        self.refused("run the case first", report.read_result, file)
+        file.write_text("{")
+        self.refused("is no JSON", report.read_result, file)
+        file.write_text("[1]")
+        self.refused("is not the result of a case", report.read_result, file)
+        result = json.loads(STORED.read_text())
+        del judgement.main_scene(result)["points"]["live 3 0"]["runs"][0]["values"]["depth"]
+        file.write_text(json.dumps(result))
+        self.refused("live 3 0 has values of", report.read_result, file)
+        self.refused("no case has results to report", report.write, [], self.folder / "report")
+
+
+class Command(Folder):
+    """The command itself with a launcher that is no LIGGGHTS."""
+
+    def validate(self, script, *words):
+        launcher = self.folder / "launcher"
+        launcher.write_text(f"#!/bin/sh\n{script}\n")
+        launcher.chmod(launcher.stat().st_mode | stat.S_IXUSR)
+        out = self.folder / "out"
+        done = subprocess.run(["/usr/bin/python3", "-m", "solidcull_runs.validate", "--out", str(out), "--report", str(self.folder / "report"), *words],
+                              cwd=ROOT / "validation", stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=120,
+                              env={**os.environ, "SOLIDCULL_LAUNCHER": str(launcher)})
+        return done.returncode, done.stderr.splitlines()
+
+    def test_a_killed_run(self):
+        status, said = self.validate("kill -9 $$", "slow_impact")
+        self.assertEqual((status, len(said)), (2, 1), said)
+        self.assertRegex(said[0], r"^validate: .*was killed by signal 9 \(SIGKILL\)")
+
+    def test_no_results(self):
+        status, said = self.validate("true", "--report-only", "slow_impact")
+        self.assertEqual((status, said), (2, ["validate: no case has results to report"]))
+
+    def test_an_unknown_case(self):
+        status, said = self.validate("true", "crater")
+        self.assertEqual(status, 2)
+        self.assertRegex(said[0], r"^validate: no case 'crater'; there is: .*slow_impact")
+
+
+class Decks(unittest.TestCase):
+    @unittest.skipUnless(shutil.which("liggghts") and (ROOT / "build" / "liggghts-solidcull").exists(), "no engine")
+    def test_every_deck_for_a_few_steps(self):
+        with tempfile.TemporaryDirectory() as folder:
+            done = subprocess.run(["/usr/bin/python3", "-m", "solidcull_runs.validate", "--few-steps", "--out", folder], cwd=ROOT / "validation",
+                                  stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=500)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for name in cases.names():
+            self.assertIn(f"{name}: ", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
