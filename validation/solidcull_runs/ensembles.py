@@ -92,6 +92,16 @@ class Course:
         self.say(f"{job.case.name}: {job.name}: {what}; {self.ended} of {self.all} runs, about {shown} left")
 
 
+def files_of(case, scene, out):
+    """Makes the case's own files for a scene; the variable that names their folder."""
+    v = case.variables(scene)
+    folder = out / case.name / "files" / short_hash(v)
+    folder.mkdir(parents=True, exist_ok=True)
+    if case.get("files"):
+        case.get("files")(folder, v)
+    return {"files": folder}
+
+
 def make_beds(cases, out, at_once, say):
     """The bed of each scene of each case: {(case's name, scene): restart file, or None}. Those of the same recipe are made once."""
     wanted, files = {}, {}
@@ -101,7 +111,7 @@ def make_beds(cases, out, at_once, say):
             file = bed and out / "beds" / f"{bed[0].parent.name}-{bed[0].stem}-{short_hash(bed[1])}.restart"
             files[case.name, scene] = file
             if bed:
-                wanted[file] = bed
+                wanted[file] = bed[0], {**bed[1], **files_of(case, scene, out)}
 
     def make(file, deck, variables):
         sources = sorted({*deck.parent.glob("*.in"), *(deck.parent.parent.parent / "shared").glob("*.in")} - {deck})
@@ -117,12 +127,8 @@ def jobs_of(case, out, beds, launcher, fix, only=None):
     jobs = []
     for scene in case.scenes:
         v = case.variables(scene)
-        folder = out / case.name / "files" / short_hash(v)
-        if case.get("files"):
-            folder.mkdir(parents=True, exist_ok=True)
-            case.get("files")(folder, v)
         bed = beds[case.name, scene]
-        given = {**v, "files": folder, **({"restart": bed} if bed else {})}
+        given = {**v, **files_of(case, scene, out), **({"restart": bed} if bed else {})}
         texts = [f.read_text() for f in sorted({*case.folder.glob("*.in"), *(case.folder.parent.parent / "shared").glob("*.in")} - {case.deck})]
         texts.append(bed.with_suffix(".recipe").read_text() if bed else "")
         wanted = [p for p in points(case.size) if (p.default or scene == case.main_scene) and (p.family != BY_HAND or case.get("by_hand"))]

@@ -4,7 +4,7 @@ import re
 import numpy as np
 
 from .engine import run_liggghts
-from .ensembles import CaseJob, run_all, short_hash
+from .ensembles import CaseJob, files_of, run_all, short_hash
 from .errors import RunError
 from .points import UNCULLED, Point
 
@@ -32,7 +32,7 @@ class ShortJob(CaseJob):
             return {}
 
 
-def short_bed(case, scene, out):
+def short_bed(case, scene, out, files):
     bed = case.bed(scene)
     if not bed:
         return None
@@ -41,7 +41,7 @@ def short_bed(case, scene, out):
     try:
         short.write_text(cut_short(deck.read_text(), BED_STEPS))
         file = out / f"{short_hash([case.name, scene])}.restart"
-        run_liggghts(short, deck.parent, file.with_suffix(".log"), {**variables, "restart": file})
+        run_liggghts(short, deck.parent, file.with_suffix(".log"), {**variables, **files, "restart": file})
     finally:
         short.unlink(missing_ok=True)
     return file
@@ -69,13 +69,9 @@ def faults_of(case, out, launcher, say):
     out.mkdir(parents=True, exist_ok=True)
     found = []
     for scene in case.scenes:
-        v = case.variables(scene)
-        folder = out / "files"
-        folder.mkdir(exist_ok=True)
-        if case.get("files"):
-            case.get("files")(folder, v)
-        bed = short_bed(case, scene, out)
-        given = {**v, "files": folder, case.need("aside"): 0, **({"restart": bed} if bed else {})}
+        files = files_of(case, scene, out)
+        bed = short_bed(case, scene, out, files)
+        given = {**case.variables(scene), **files, case.need("aside"): 0, **({"restart": bed} if bed else {})}
         jobs = [ShortJob(case, scene, p, 0, out, given, 0, launcher, "") for p in POINTS]
         for job in jobs:
             job.file(".kept").unlink(missing_ok=True)

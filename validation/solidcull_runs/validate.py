@@ -51,7 +51,7 @@ def run_case(case, out, beds, launcher, fix, at_once):
     part = file.with_suffix(".part")
     part.write_text(json.dumps(result) + "\n")
     part.rename(file)
-    return [f"{case.name}: {f['run']}: {f['why']}" for f in result["failed"]]
+    return [f"{case.name}: {f['why']}" for f in result["failed"]]
 
 
 def draw(case, done, file):
