@@ -228,6 +228,11 @@ def result_of(case, done):
             entry = of_scene.setdefault(p.name, {"family": p.family, "absolute": p.absolute, "share": p.share, "default": p.default, "runs": []})
             entry["runs"].append(run_data(job, run))
         result["scenes"][scene] = {"granules": case.granules(scene), "points": of_scene}
+        unculled = next((e for e in of_scene.values() if e["family"] == UNCULLED), {"runs": []})
+        values = [tuple(r["values"].values()) for r in unculled["runs"]]
+        if len(set(values)) < len(values):
+            result["failed"].append({"run": "unculled", "point": UNCULLED, "why": f"unculled runs are alike: '{case.need('aside')}' moves "
+                                     "nothing, as with '-${aside}', or a mesh whose fix ID is in the restart file"})
     result["lost"] = lost(done, case)
     main = {job: run for job, run in done.items() if job.scene == case.main_scene and not isinstance(run, str)}
     finals = {}
