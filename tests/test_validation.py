@@ -130,26 +130,29 @@ class Points(unittest.TestCase):
 
 class Statistics(unittest.TestCase):
     def test_two_one_sided_tests(self):
-        a, b = [1.0, 1.1, 0.9, 1.05, 0.95], [1.02, 1.08, 0.99]
+        a, b = dict(enumerate([1.0, 1.1, 0.9, 1.05, 0.95])), dict(enumerate([1.02, 1.08, 0.99]))
         v = equivalence.judged(a, b, 0.2)
-        va, vb = statistics.variance(a) / 5, statistics.variance(b) / 3
-        freedom = (va + vb)**2 / (va**2 / 4 + vb**2 / 2)
-        self.assertAlmostEqual(freedom, 5.9823, 3)
-        half = 1.944 * math.sqrt(va + vb)  # Student's t of 95 % at 5.98 degrees of freedom, from a table: 1.943 at 6, 2.015 at 5
+        pairs = [0.02, -0.02, 0.09]
         self.assertAlmostEqual(v.difference, 0.03, 12)
-        self.assertAlmostEqual(v.high - v.difference, half, 3)
+        self.assertAlmostEqual(v.high - v.difference, 2.920 * statistics.stdev(pairs) / math.sqrt(3), 4)  # Student's t: 95 %, 2 degrees
         self.assertEqual(v.word, equivalence.SAME)
         self.assertEqual(equivalence.judged(a, b, 0.05).word, equivalence.OPEN)
-        self.assertEqual(equivalence.judged(a, [x + 1 for x in b], 0.2).word, equivalence.OTHER)
+        self.assertEqual(equivalence.judged(a, {k: x + 1 for k, x in b.items()}, 0.2).word, equivalence.OTHER)
         self.assertAlmostEqual(v.in_margins, 0.15, 12)
+
+    def test_what_the_start_does_is_in_neither_run_of_a_pair(self):
+        a = {0: 1.0, 1: 2.0, 2: 3.0}
+        self.assertEqual(equivalence.judged(a, {0: 1.01, 1: 2.02, 2: 3.01}, 0.1).word, equivalence.SAME)
+        self.assertEqual(equivalence.judged(a, {0: 2.01, 1: 3.02, 2: 1.01}, 0.1).word, equivalence.OPEN)
 
     def test_scatter_is_no_equivalence(self):
         """Runs that differ by nothing on average, but scatter by more than the margin, show nothing."""
-        self.assertEqual(equivalence.judged([0, 10, -10, 5, -5], [0, 10, -10], 1).word, equivalence.OPEN)
-        self.assertEqual(equivalence.judged([0, 10, -10, 5, -5], [0], 1).word, equivalence.OPEN)
-        self.assertEqual(equivalence.judged([1, 1, 1], [1, 1], 0.1).word, equivalence.SAME)
-        with self.assertRaises(ValueError):
-            equivalence.judged([1], [1], 1)
+        self.assertEqual(equivalence.judged(dict(enumerate([0, 10, -10, 5, -5])), dict(enumerate([10, 0, -10])), 1).word, equivalence.OPEN)
+        self.assertEqual(equivalence.judged(dict(enumerate([0, 10, -10, 5, -5])), {0: 0}, 1).word, equivalence.OPEN)
+        self.assertEqual(equivalence.judged({0: 1, 1: 1}, {0: 1, 1: 1}, 0.1).word, equivalence.SAME)
+        for a, b in (({0: 1}, {0: 1}), ({0: 1, 1: 2}, {5: 1})):
+            with self.assertRaises(ValueError):
+                equivalence.judged(a, b, 1)
 
     def test_order(self):
         tolerances = [1, 3, 10, 30]
@@ -210,10 +213,10 @@ class Report(Folder):
     def test_judged_as_by_hand(self):
         result = self.stored()
         scene = judgement.main_scene(result)
-        u = [r["values"]["depth"] for r in scene["points"]["unculled"]["runs"]]
-        c = [r["values"]["depth"] for r in scene["points"]["sleep 3 0"]["runs"]]
+        u = {r["k"]: r["values"]["depth"] for r in scene["points"]["unculled"]["runs"]}
+        c = {r["k"]: r["values"]["depth"] for r in scene["points"]["sleep 3 0"]["runs"]}
         j = judgement.judge(result)["sleep 3 0"]
-        self.assertAlmostEqual(j.verdicts["depth"].in_margins, abs(statistics.fmean(c) - statistics.fmean(u)) / (0.02 * statistics.fmean(u)), 9)
+        self.assertAlmostEqual(j.verdicts["depth"].in_margins, abs(statistics.fmean(c[k] - u[k] for k in c)) / (0.02 * statistics.fmean(u.values())), 9)
         self.assertAlmostEqual(j.of_unculled, statistics.median(r["seconds"] for r in scene["points"]["sleep 3 0"]["runs"])
                                / statistics.median(r["seconds"] for r in scene["points"]["unculled"]["runs"]), 12)
 

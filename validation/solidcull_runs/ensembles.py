@@ -131,12 +131,13 @@ def jobs_of(case, out, beds, launcher, fix, only=None):
         given = {**v, **files_of(case, scene, out), **({"restart": bed} if bed else {})}
         texts = [f.read_text() for f in sorted({*case.folder.glob("*.in"), *(case.folder.parent.parent / "shared").glob("*.in")} - {case.deck})]
         texts.append(bed.with_suffix(".recipe").read_text() if bed else "")
-        wanted = [p for p in points(case.size) if (p.default or scene == case.main_scene) and (p.family != BY_HAND or case.get("by_hand"))]
-        for k in range(max(runs_of(p, case.size) for p in wanted)):
+        main = scene == case.main_scene
+        wanted = [p for p in points(case.size) if (p.default or main) and (p.family != BY_HAND or case.get("by_hand"))]
+        for k in range(max(runs_of(p, case.size, main) for p in wanted)):
             for p in wanted:
-                if k >= runs_of(p, case.size) or (only and (p.name not in only[0] or k >= only[1])):
+                if k >= runs_of(p, case.size, main) or (only and (p.name not in only[0] or k >= only[1])):
                     continue
-                frames = v.get("frames", FRAMES) if k == 0 and p.default and scene == case.main_scene else 0
+                frames = v.get("frames", FRAMES) if k == 0 and p.default and main else 0
                 aside = {case.need("aside"): ASIDE[k]}
                 made_with = "\n".join([*texts, fix if p.family not in (UNCULLED, BY_HAND) else ""])
                 jobs.append(CaseJob(case, scene, p, k, out / case.name / "runs", {**given, **aside}, frames, launcher, made_with))

@@ -1,4 +1,4 @@
-"""How a culled result is judged beside an unculled one: by two one-sided tests, and how error falls with tolerance."""
+"""How culled runs are judged beside unculled ones, in pairs: by two one-sided tests, and how error falls with tolerance."""
 import math
 import statistics
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ SAME, OTHER, OPEN = "equivalent", "outside", "not decided"
 @dataclass(frozen=True)
 class Verdict:
     word: str          # SAME, OTHER or OPEN
-    difference: float  # mean of the culled less mean of the unculled runs
+    difference: float  # culled less unculled, mean of the pairs
     low: float         # the difference lies between these, by LEVEL on either side
     high: float
     margin: float
@@ -24,21 +24,18 @@ class Verdict:
 
 
 def judged(unculled, culled, margin):
-    """Two one-sided t tests of unequal variances (Schuirmann 1987, Welch 1947). SAME: the difference is smaller than the margin, and
+    """Two one-sided t tests on pairs of runs (Schuirmann 1987). `unculled`, `culled`: the value of each run by its number; runs of one
+    number start alike, so what their start does to a figure is in neither. SAME: the difference is smaller than the margin, and
     chance is not the reason. OTHER: it is larger, and chance is not the reason. OPEN: the runs scatter too much to tell."""
-    n, m = len(unculled), len(culled)
-    if n < 2 or m < 1:
-        raise ValueError(f"{n} unculled and {m} culled runs cannot be judged")
-    difference = statistics.fmean(culled) - statistics.fmean(unculled)
-    a = statistics.variance(unculled) / n
-    # a lone culled run scatters as an unculled one
-    b = statistics.variance(culled) / m if m > 1 else statistics.variance(unculled)
-    error = math.sqrt(a + b)
-    if error == 0:
-        half = 0.0
-    else:
-        freedom = (a + b)**2 / (a**2 / (n - 1) + b**2 / max(m - 1, 1)) if m > 1 else n - 1
-        half = float(stats.t.ppf(1 - LEVEL, freedom)) * error
+    pairs = [culled[k] - unculled[k] for k in sorted(culled) if k in unculled]
+    if len(unculled) < 2 or not pairs:
+        raise ValueError(f"{len(unculled)} unculled runs and {len(pairs)} pairs cannot be judged")
+    difference = statistics.fmean(pairs)
+    if len(pairs) > 1:
+        error, freedom = statistics.stdev(pairs) / math.sqrt(len(pairs)), len(pairs) - 1
+    else:  # a lone pair scatters as two unculled runs
+        error, freedom = statistics.stdev(unculled.values()) * math.sqrt(2), len(unculled) - 1
+    half = float(stats.t.ppf(1 - LEVEL, freedom)) * error
     low, high = difference - half, difference + half
     word = SAME if -margin < low and high < margin else OTHER if low > margin or high < -margin else OPEN
     return Verdict(word, difference, low, high, margin)

@@ -48,7 +48,8 @@ def main_scene(result):
 
 
 def values_of(entry, metric):
-    return [run["values"][metric] for run in entry["runs"]]
+    """The value of each run, by its number."""
+    return {run["k"]: run["values"][metric] for run in entry["runs"]}
 
 
 def unculled_of(scene):
@@ -56,7 +57,7 @@ def unculled_of(scene):
 
 
 def verdict(metric, unculled, culled):
-    mean = statistics.fmean(unculled)
+    mean = statistics.fmean(unculled.values())
     allowed = metric["margin"] * abs(mean) if metric["relative"] else metric["margin"]
     return equivalence.judged(unculled, culled, allowed)
 
@@ -90,7 +91,7 @@ def noise_of(result):
         return None
     found = []
     for m in result["metrics"]:
-        values = values_of(unculled, m["name"])
+        values = list(values_of(unculled, m["name"]).values())
         allowed = m["margin"] * abs(statistics.fmean(values)) if m["relative"] else m["margin"]
         found.append(equivalence.noise(values) / allowed if allowed else 0.0)
     return max(found)
@@ -104,7 +105,7 @@ def orders(result, judged):
         of_family = [j for j in judged.values() if j.family == family and j.absolute and not j.share]
         for m in result["metrics"]:
             p = equivalence.order([j.absolute for j in of_family], [abs(j.verdicts[m["name"]].difference) for j in of_family],
-                                  equivalence.noise(values_of(unculled, m["name"])))
+                                  equivalence.noise(list(values_of(unculled, m["name"]).values())))
             if p is not None:
                 found[family, m["name"]] = p
     return found

@@ -9,7 +9,8 @@ class Point:
     keywords: str = ""        # of the fix
     absolute: float = None    # the first number of `tolerance`
     share: float = 0.0        # the second
-    runs: tuple = (1, 2)      # in the quick and in the full size
+    runs: tuple = (1, 2)      # in the quick and in the full size, of the first scene
+    others: tuple = (3, 5)    # likewise of the other scenes
     default: bool = False     # run in every scene, and judged
 
 
@@ -28,7 +29,7 @@ def points(size):
     """All points of a size, in the order in which they are run."""
     found = [Point(UNCULLED, UNCULLED, runs=(5, 5), default=True)]
     for family in (SLEEP, LIVE):
-        found.append(tolerated(family, *DEFAULT, runs=(3, 5), default=True))
+        found.append(tolerated(family, *DEFAULT, runs=(5, 5), default=True))
     for family in (SLEEP, LIVE):
         found += [tolerated(family, a) for a in ABSOLUTE[size]]
         found += [tolerated(family, DEFAULT[0], s) for s in SHARES[size]]
@@ -37,5 +38,5 @@ def points(size):
     return found
 
 
-def runs_of(point, size):
-    return point.runs[size == "full"]
+def runs_of(point, size, main=True):
+    return (point.runs if main else point.others)[size == "full"]

@@ -118,7 +118,7 @@ def first_page(page, results, folder, how):
     page.heading(1, "solidcull: run time against error")
     page.text(how)
     page.text("Each case is run unculled at least five times, its tool, ball or wall 10 µm farther each time, and culled from the same "
-              "restart file. An error is the distance of the culled runs' mean from the unculled runs' mean. It is given in margins, "
+              "restart file. An error is what a culled run differs from the unculled one that starts alike, mean of all pairs. It is given in margins, "
               "which each case's README has fixed before. The verdict is that of two one-sided tests at 5 %: `equivalent`, "
               "`outside`, or `not decided` where the runs scatter too much to tell. Time is that of a core in LIGGGHTS's loop.")
     page.table(FIRST, [first_row(r) for r in results])
@@ -148,7 +148,7 @@ def case_section(page, result, folder, runs_folder):
     defaults = [j for j in (default_of(judged, SLEEP), default_of(judged, LIVE)) if j]
     rows = []
     for m in result["metrics"]:
-        values = judgement.values_of(unculled, m["name"])
+        values = list(judgement.values_of(unculled, m["name"]).values())
         mean = sum(values) / len(values)
         row = [f"{m['name']} ({m['unit']})", f"{mean:.4g}", f"{min(values):.4g} to {max(values):.4g}",
                f"{100 * m['margin']:g} %" if m["relative"] else f"{m['margin']:g}"]
