@@ -208,6 +208,8 @@ class Report(Folder):
             self.assertGreater((folder / picture).stat().st_size, 5000, picture)
         self.assertEqual(page.count("data:image/png;base64,"), 3)
         self.assertNotIn("src=\"slow", page)
+        self.assertIn('<a href="#slow-impact-craters">slow_impact</a>', page)
+        self.assertIn('id="slow-impact-craters"', page)
         self.assertFalse((self.folder / "report.part").exists())
 
     def test_judged_as_by_hand(self):

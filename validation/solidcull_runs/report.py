@@ -33,6 +33,11 @@ def read_result(file):
     return result
 
 
+def anchor(title):
+    """The name that Markdown gives a heading."""
+    return re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")
+
+
 class Page:
     """Blocks of text, tables and pictures, written as Markdown and as HTML."""
 
@@ -68,13 +73,14 @@ class Page:
         def marked(text):
             text = html.escape(text)
             text = re.sub(r"`([^`]+)`", r"<code>\1</code>", text)
+            text = re.sub(r"\[([^]]+)\]\((#[^)]+)\)", r'<a href="\2">\1</a>', text)
             return re.sub(r"\*\*([^*]+)\*\*", r"<b>\1</b>", text)
         out = [f"<!doctype html><html lang=en><meta charset=utf-8><title>{html.escape(title)}</title><style>body{{font:15px/1.5 sans-serif;"
                "max-width:70em;margin:2em auto;padding:0 1em}table{border-collapse:collapse;margin:1em 0}td,th{border:1px solid #ccc;"
                "padding:.2em .6em;text-align:left}img{max-width:100%}</style>"]
         for kind, *b in self.blocks:
             if kind == "heading":
-                out.append(f"<h{b[0]}>{marked(b[1])}</h{b[0]}>")
+                out.append(f'<h{b[0]} id="{anchor(b[1])}">{marked(b[1])}</h{b[0]}>')
             elif kind == "text":
                 out.append(f"<p>{marked(b[0])}</p>")
             elif kind == "picture":
@@ -99,15 +105,11 @@ def first_row(result):
     judged = judgement.judge(result)
     scene = judgement.main_scene(result)
     bound = result["bound"] and result["bound"]["N/N_moving"]
-    cells = [f"[{result['case']}](#{anchor(result)})", f"{scene['granules']:,}", figure_of(bound)]
+    cells = [f"[{result['case']}](#{anchor(result['title'])})", f"{scene['granules']:,}", figure_of(bound)]
     for family in (SLEEP, LIVE):
         j = default_of(judged, family)
         cells += [f"{j.speed_up:.2f}", f"{j.error:.2f} ({j.worst})", j.word] if j else ["-", "-", "not run"]
     return cells + [str(result["lost"])]
-
-
-def anchor(result):
-    return re.sub(r"[^\w -]", "", result["title"].lower()).replace(" ", "-")
 
 
 FIRST = ["case", "granules", "N/N_moving", "`sleep`: times faster", "largest error, in margins", "verdict",
@@ -165,7 +167,7 @@ def case_section(page, result, folder, runs_folder):
     figures.case_plots(result, judged, folder / f"{name}-error.png")
     page.picture(folder / f"{name}-error.png", f"{name}: run time against error, and error against tolerance")
     page.table(["point", "runs", "time over unculled", "exterior", "interface", "restored", "largest error, in margins", "of"],
-               [[f"`{j.keywords}`" if hasattr(j, "keywords") else j.name, j.runs, f"{j.of_unculled:.3f}", *(
+               [[j.name, j.runs, f"{j.of_unculled:.3f}", *(
                    "-" if c is None else f"{c:,.0f}" for c in (j.exterior, j.interface, j.restored)), f"{j.error:.2f}", j.worst]
                 for j in judged.values()])
     found = judgement.orders(result, judged)
