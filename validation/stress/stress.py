@@ -1,0 +1,507 @@
+#!/usr/bin/python3
+"""Numerical stability: decks that a solver of granules fails at, culled with `exterior live` and with `exterior sleep`, and unculled.
+
+    validation/stress/stress.py [--quick|--full] [--few-steps] [CASE ...]
+
+Settles the beds once (out/*.restart), runs each part of each case three times (unculled, live, sleep), prints what holds and leaves
+all figures in out/KIND/CASE.json. README.md says what is held against what. Runs are kept as long as deck, variables and the fix are
+the same. `--quick` (the default) takes minutes, `--full` about an hour; `--few-steps` is for CI: every deck for a few steps, without
+bars. Exit: 0 all good, 1 a bar missed, 2 no result.
+"""
+import argparse
+import json
+import math
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+MOTION = HERE.parent / "motion"
+sys.path.insert(0, str(HERE.parent))
+from solidcull_runs import beds, engine, errors, few_steps, logs, metrics, tables, twins  # noqa: E402
+from solidcull_runs.dumps import read_final, snapshots  # noqa: E402
+from solidcull_runs.metrics import check  # noqa: E402
+
+GRAVITY, DENSITY, POISSON = 9.81, 2500, 0.3
+KINDS = {"unculled": None, "live": "exterior live", "sleep": "exterior sleep"}  # of runs, and their keywords
+INJECTED = 1e-6        # m g d per restored granule: energy that the fix may add
+STILL = 1e-9           # M g d: kinetic energy of a bed that was at rest from the start
+CALMED = 1e-4          # M g d: of one that has come to rest again
+HEATED = 1e-3          # M g d: more than that at the end, where all should rest, is unstable
+PEAK, FASTEST, LATE = 1.1, 1.5, 2.0  # culled over unculled: largest kinetic energy, largest speed, kinetic energy at the end
+SURE = 0.25            # of the Rayleigh time: a run with such steps or smaller ones has to be stable
+FEW_KEYWORDS = "depth 0.25 voxel 0.125 every 20 calm 1 speed 0.1"  # so that a small bed locks granules within few steps
+
+
+@dataclass
+class Effort:
+    """How much is run: `quick`, `full` or `few`."""
+    kind: str = "quick"
+
+    @property
+    def out(self):
+        return HERE / "out" / self.kind
+
+    def of(self, quick, full, few):
+        return {"quick": quick, "full": full, "few": few}[self.kind]
+
+
+effort = Effort()
+
+
+@dataclass
+class Part:
+    """One deck with its variables, to be run three times."""
+    name: str
+    deck: str
+    variables: dict
+    granules: int
+    steps: int                      # after the fix line
+    calm: float = CALMED            # M g d: kinetic energy that is allowed at the end in any case
+    at_limit: bool = False          # unculled may be unstable
+    lossy: bool = False             # unculled may lose granules
+    unculled: dict = field(default_factory=dict)  # variables of the unculled run alone
+    more: object = None             # more(part, runs): more checks
+    diameter: float = 0.005         # m: the d of m g d
+    young: float = 5e6              # Pa
+
+    def out(self):
+        return effort.out / self.name
+
+    def work(self):
+        return self.granules * self.steps
+
+
+# --- beds -----------------------------------------------------------------------------------------------------------
+
+def settled(bed, few=None, **variables):
+    """The restart file of a bed at rest, relative to this folder."""
+    sources = [MOTION / f for f in ("engine.in", "material.in", "sides.in", "box.in")]
+    if effort.kind == "few":
+        variables.update({"granules": 150, "pour": 0.15, "damp": 0.15, "free": 0.02, "stills": 1, "top": 0.1, **(few or {})})
+    file = effort.out / f"{bed}.restart"
+    return beds.settled(file, MOTION / "settle.in", sources, {"name": "box", **variables}).relative_to(HERE)
+
+
+def count(granules):
+    return 150 if effort.kind == "few" else granules
+
+
+def rayleigh_time(radius, young):
+    """Rayleigh time of a granule (s)."""
+    shear = young / (2 * (1 + POISSON))
+    return math.pi * radius * math.sqrt(DENSITY / shear) / (0.1631 * POISSON + 0.8766)
+
+
+BOX = (0.04, 0.035)   # m: L and W of the beds of 5 mm
+SMALLEST = 0.0023     # m: the smaller radius in them
+
+
+def soft_bed(**more):
+    """Granules of 5 mm, E = 5e6."""
+    n = effort.of(300, 1000, 150)
+    name = "soft" + "".join(f"-{k}{v:g}" for k, v in more.items())
+    return settled(name, granules=n, L=BOX[0], W=BOX[1], stills=3, **more), n
+
+
+# --- runs -----------------------------------------------------------------------------------------------------------
+
+class StressJob(twins.KeptJob):
+    """A run that may stop: then the run has a `failure`, the line that says why."""
+
+    def note(self):
+        return json.loads(self.file(".kept").read_text()) if self.file(".kept").exists() else {}
+
+    def kept(self):
+        note = self.note()
+        if note.get("failure") and note["recipe"] == self.recipe() and self.file(".log").exists():
+            return self.stopped(note["failure"], note["wall"], note["cpu"])
+        run = super().kept()
+        if run:
+            run.failure = None
+        return run
+
+    def stopped(self, failure, wall, cpu):
+        tables_ = logs.parse_log(self.file(".log").read_text(errors="replace"))
+        run = twins.Run(self.name, tables_, logs.loop_time(tables_), wall=wall, cpu=cpu)
+        run.failure = failure
+        return run
+
+    def finish(self, process):
+        if not process.child.returncode:
+            run = super().finish(process)
+            run.failure = None
+            return run
+        try:
+            process.text()
+        except errors.RunError as e:
+            failure = str(e)
+        run = self.stopped(failure, process.wall, process.cpu)
+        self.file(".kept").write_text(json.dumps({"recipe": self.recipe(), "wall": run.wall, "cpu": run.cpu, "failure": failure}))
+        return run
+
+
+def run_part(part, say):
+    """The three runs of a part, by kind."""
+    launcher = engine.find_launcher()
+    sources = "".join(f.read_text() for folder in (HERE, MOTION) for f in sorted(folder.glob("*.in")))
+    bed = beds.recipe_of(HERE / part.variables["restart"]) if "restart" in part.variables else ""
+    jobs = []
+    for name, keywords in KINDS.items():
+        kind = "culled" if keywords else "unculled"
+        variables = {"start_dump": (part.out() / "start.dump").relative_to(HERE), "folder": part.out().relative_to(HERE), **part.variables,
+                     **(part.unculled if not keywords else {})}
+        if keywords and effort.kind == "few" and "heavy" not in part.name:
+            keywords += " " + FEW_KEYWORDS
+        made_with = sources + bed + (engine.hash_of_fix(launcher) if keywords else "")
+        jobs.append(StressJob(HERE / part.deck, part.out(), kind, 0, variables, launcher=launcher, keywords=keywords, name=name,
+                              made_with=made_with))
+    return dict(zip(KINDS, twins.run_jobs(jobs, say=say, steps=part.steps)))
+
+
+# --- what is held against what --------------------------------------------------------------------------------------
+
+def column(run, whole, of_atoms):
+    """Steps and a figure of all granules: what the fix gives, or of the atoms where it does not run."""
+    return run.series(whole if run.counts else of_atoms)
+
+
+class Figures:
+    """What is asked of a run. Energies in M g d: mass of all granules times gravity times the mean diameter."""
+
+    def __init__(self, part, run, unit, granules):
+        self.failure = run.failure
+        self.finite, self.peak, self.late, self.fastest, self.lost = True, math.nan, math.nan, math.nan, None
+        values = np.array([v for t in run.tables if t.counted for row in t.rows for v in row])
+        self.finite = bool(np.isfinite(values).all())
+        if values.size:
+            energy = sum_of(run, ("f_cull[27]", "c_ke"), ("f_cull[28]", "c_rot"))[1:] / unit
+            tenth = max(1, len(energy) // 10)
+            self.peak, self.late = float(energy.max()), float(energy[-tenth:].max())
+            self.fastest = float(run.series("v_fastest")[1][1:].max())
+        if run.final is not None:
+            self.finite = self.finite and all(np.isfinite(run.final[c]).all() for c in ("mass", "x", "y", "z"))
+            self.lost = granules - len(np.unique(run.final["id"]))
+        culled = run.counts is not None
+        self.restored = float(run.series("f_cull[7]")[1].max()) if culled else 0.0
+        self.carves = float(run.series("f_cull[8]")[1].max()) if culled else 0.0
+        self.most_culled = float((run.series("f_cull[2]")[1] + run.series("f_cull[3]")[1]).max()) if culled else 0.0
+        self.added = float(run.series("f_cull[12]")[1].max()) if culled else 0.0  # J
+
+    def stable(self):
+        return not self.failure and self.finite and (self.late <= HEATED or effort.kind == "few")
+
+
+def sum_of(run, *columns):
+    return sum(run.series(whole if run.counts is not None else of_atoms)[1] for whole, of_atoms in columns)
+
+
+def judge(part, runs):
+    """Checks, notes and figures of a part."""
+    unculled = runs["unculled"]
+    if unculled.failure and not (part.at_limit or part.lossy):
+        raise errors.RunError(f"{part.name}: {unculled.failure}")
+    some = next((r.final for r in runs.values() if r.final is not None), None)
+    mass = float(some["mass"].sum()) if some is not None else part.granules * DENSITY * math.pi / 6 * part.diameter**3
+    unit = mass * GRAVITY * part.diameter
+    grain = unit / part.granules  # J: the mean m g d
+    f = {kind: Figures(part, run, unit, part.granules) for kind, run in runs.items()}
+    u, checks = f["unculled"], []
+    if not u.stable() and not part.at_limit:
+        raise errors.RunError(f"{part.name}: the unculled run is not stable: {u.late:.3g} M g d at its end")
+    for kind in ("live", "sleep"):
+        c, run = f[kind], runs[kind]
+        what = f"{part.name}, {kind}: "
+        if not u.stable():  # then nothing of ours may crash
+            one_line = c.failure is None or "was killed" not in c.failure and "ERROR" in c.failure
+            checks.append(check(what + "unculled is unstable; no crash", 0 if one_line else 1, 0))
+            continue
+        checks.append(check(what + ("stopped" if c.failure else "not finite"), bool(c.failure) or not c.finite, 0))
+        if c.failure:
+            print(f"  {c.failure}", flush=True)
+            continue
+        same_ids = part.lossy or np.array_equal(run.final["id"], unculled.final["id"])
+        same_mass = part.lossy or abs(run.final["mass"].sum() - mass) <= 1e-12 * mass
+        checks.append(check(what + "granules lost", c.lost, u.lost if part.lossy else 0, c.lost <= (u.lost if part.lossy else 0) and same_ids and same_mass))
+        checks.append(check(what + "kinetic energy, largest (M g d)", c.peak, max(PEAK * u.peak, part.calm)))
+        checks.append(check(what + "kinetic energy, last tenth (M g d)", c.late, max(LATE * u.late, part.calm)))
+        slow = math.sqrt(2 * part.calm * unit / (mass / part.granules))  # m/s: all of that energy in one granule
+        checks.append(check(what + "largest speed (m/s)", c.fastest, max(FASTEST * u.fastest, slow)))
+        checks.append(check(what + "energy added, of m g d per granule restored", c.added / grain / max(c.restored, 1), INJECTED))
+    if u.stable() and part.more:
+        checks += part.more(part, runs, grain)
+    if effort.kind == "few":
+        few_steps.check({"unculled": [unculled], "culled": [runs["live"], runs["sleep"]]}, part.granules, part.steps, part.young == 5e6 and part.name != "cycle-creep",  # these beds still fall
+                        where=f"{part.name}, ")
+    return checks, {kind: vars(figures) | {"stable": figures.stable()} for kind, figures in f.items()}
+
+
+# --- energy of a bed ------------------------------------------------------------------------------------------------
+
+def mechanical_energy(g, young, size):
+    """Energy (J) of a bed in its box from places, velocities and spins: kinetic, of height, and elastic of the normal contacts after
+    Hertz, of granules, floor and sides. Tangential springs are left out: they are in no dump."""
+    m, r, x = g["mass"], g["radius"], np.stack([g[c] for c in "xyz"], 1)
+    kinetic = 0.5 * (m * sum(g[c]**2 for c in ("vx", "vy", "vz"))).sum()
+    kinetic += 0.2 * (m * r**2 * sum(g[c]**2 for c in ("omegax", "omegay", "omegaz"))).sum()
+    modulus = young / (2 * (1 - POISSON**2))
+    elastic = 0.0
+    for i in range(len(r) - 1):
+        overlap = r[i] + r[i + 1:] - np.sqrt(((x[i + 1:] - x[i])**2).sum(1))
+        k = overlap > 0
+        elastic += (np.sqrt(r[i] * r[i + 1:][k] / (r[i] + r[i + 1:][k])) * overlap[k]**2.5).sum()
+    for gap in (x[:, 0], size[0] - x[:, 0], x[:, 1], size[1] - x[:, 1], x[:, 2]):
+        overlap = np.maximum(r - gap, 0)
+        elastic += (np.sqrt(r) * overlap**2.5).sum()
+    return kinetic + GRAVITY * (m * x[:, 2]).sum() + 8 / 15 * modulus * elastic
+
+
+def read_whole(file):
+    (_, columns, rows), = snapshots(file)
+    return dict(zip(columns, rows[np.argsort(rows[:, columns.index("id")])].T))
+
+
+def cycles_energy(part, runs, grain):
+    """What the bed's energy rises by while culled, over all cycles, against the unculled run."""
+    def rises(name):
+        total = 0.0
+        for k in range(1, part.variables["cycles"] + 1):
+            a, b = (mechanical_energy(read_whole(part.out() / f"{name}.{k}.{when}"), 5e6, BOX) for when in ("culled", "restored"))
+            total += max(0.0, b - a)
+        return total
+
+    unculled, checks = rises("unculled"), []
+    for kind in ("live", "sleep"):
+        last = [t.rows[-1][t.column("f_cull[2]")] + t.rows[-1][t.column("f_cull[3]")] for t in runs[kind].tables
+                if t.counted and t.rows and t.column("f_cull[2]") is not None]
+        restored = sum(last)
+        checks.append(check(f"{part.name}, {kind}: rise of mechanical energy while culled, of m g d per granule restored",
+                            max(0.0, rises(kind) - unculled) / grain / max(1, restored), INJECTED))
+        checks.append(check(f"{part.name}, {kind}: cycles in which nothing was culled", sum(n == 0 for n in last), part.variables["cycles"] // 10))
+    return checks
+
+
+# --- cases ----------------------------------------------------------------------------------------------------------
+
+def drift(run, start):
+    """Largest displacement of a granule since the start dump, in mean diameters."""
+    a, b = read_final(start), run.final
+    moved = np.sqrt(sum((a[c] - b[c])**2 for c in "xyz"))
+    return float(moved.max() / (2 * a["radius"].mean()))
+
+
+def stays(part, runs, grain):
+    start = part.out() / "start.dump"
+    bar = max(1e-6, drift(runs["unculled"], start))
+    return [check(f"{part.name}, {kind}: drift (d)", drift(runs[kind], start), bar) for kind in ("live", "sleep")]
+
+
+def rest():
+    """A bed at rest for 10^6 steps; and one whose steps pass number 2^31."""
+    n = effort.of(200, 500, 150)
+    # rolling friction (epsd2) is a spring without damping: a loose granule swings for seconds
+    bed = settled("column", L=0.03, W=0.03, granules=n, top=0.5, **effort.of({"free": 1, "stills": 8}, {"free": 3, "stills": 8}, {}))
+    base = {"restart": bed, "L": 0.03, "W": 0.03, "before": effort.of(1000, 1000, 50)}
+    steps, passing = effort.of(100_000, 1_000_000, 500), effort.of(8000, 50_000, 400)
+    return [Part("rest", "rest.in", {**base, "steps": steps, "rows": effort.of(100, 1000, 50)}, n, steps, STILL, more=stays),
+            Part("rest-step-2^31", "rest.in", {**base, "steps": passing, "rows": effort.of(50, 100, 50), "first": 2**31 - passing // 2}, n, passing,
+                 STILL, more=stays)]
+
+
+def struck(name, bed, n, young, share, at_limit=False, blow=0.5, **more):
+    """A part with `blow.in`, of the same time whatever the time step."""
+    dt = share * rayleigh_time(SMALLEST, young)
+    time_of = effort.of((0.1, 0.4), (0.5, 1.5), None)
+    rest_, after = (round(t / dt) for t in time_of) if time_of else (300, 200)
+    return Part(name, "blow.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "E": young, "dt": dt, "steps": rest_, "after": after, "blow": blow,
+                                  "before": effort.of(500, 1000, 50), "rows": 20, **more}, n, rest_ + after, at_limit=at_limit, young=young)
+
+
+def timestep():
+    """Ever larger time steps, in percent of the Rayleigh time, until the unculled run is unstable and beyond."""
+    bed, n = soft_bed()
+    shares = effort.of((10, 30, 50, 70, 80, 90, 100, 120, 160), (5, 10, 20, 30, 40, 50, 60, 70, 75, 80, 85, 90, 95, 100, 110, 120, 140, 160, 200), (10, 30))
+    return [struck(f"timestep-{s}", bed, n, 5e6, s / 100, s / 100 > SURE) for s in shares]
+
+
+def stiffness():
+    """Young's modulus up to 1e9, two time steps; and a mix of 1 and 5 mm."""
+    parts = []
+    n = effort.of(200, 500, 150)
+    for young in effort.of((1e8, 1e9), (5e7, 1e8, 1e9), (1e9,)):
+        whole = rayleigh_time(SMALLEST, young)
+        bed = settled(f"stiff-{young:g}", L=BOX[0], W=BOX[1], granules=n, E=young, dt=0.22 * whole, top=0.08, pour=0.15, damp=0.2, free=0.03,
+                      stills=4, few={"pour": 0.01, "damp": 0.002, "free": 0.0005})
+        for share in effort.of((25, 60), (5, 15, 25, 40, 60, 80), (25,)):
+            part = struck(f"stiffness-{young:g}-{share}", bed, n, young, share / 100, share / 100 > SURE)
+            if effort.kind == "quick":  # a tenth of a second is enough
+                part.variables.update(steps=round(0.03 / part.variables["dt"]), after=round(0.1 / part.variables["dt"]))
+                part.steps = part.variables["steps"] + part.variables["after"]
+            parts.append(part)
+    if effort.kind != "few":
+        for young in effort.of((5e6,), (5e6, 1e9), ()):
+            whole = rayleigh_time(0.0005, young)
+            bed = settled(f"mix-{young:g}", L=0.012, W=0.012, granules=450, small=0.0005, large=0.0025, share=0.25, E=young, top=0.06, dt=0.22 * whole,
+                          pour=0.15, damp=0.15, free=0.05, stills=6)
+            for share in effort.of((25,), (5, 15, 25), ()):
+                dt = share / 100 * whole
+                steps = effort.of(8000, 20000, 300)
+                parts.append(Part(f"stiffness-mix-{young:g}-{share}", "rest.in", {"restart": bed, "L": 0.012, "W": 0.012, "E": young, "dt": dt,
+                                  "skin": 0.00015, "before": 100, "rows": 20, "steps": steps}, 450, steps, HEATED, diameter=0.001))
+    return parts
+
+
+def cohesion():
+    """Granules that stick, SJKR."""
+    bed, n = soft_bed()
+    return [struck(f"cohesion-{c:g}", bed, n, 5e6, 0.15, glue="sticky", cohesion=c) for c in effort.of((3e4, 1e5), (1e4, 3e4, 1e5, 2e5), (1e5,))]
+
+
+def ratio():
+    """One granule of 10 and 20 times the diameter falls on small ones, and is pushed aside."""
+    parts = []
+    for times, side, quick, full in effort.of(((10, 0.03, 800, 0), (20, 0.045, 1500, 0)), ((10, 0.04, 0, 2000), (20, 0.06, 0, 5000)), ((20, 0.045, 0, 0),)):
+        n = effort.of(quick, full, 150)
+        dt = 0.2 * rayleigh_time(0.00095, 5e6)
+        bed = settled(f"fine-{times}", L=side, W=side, granules=n, small=0.00095, large=0.00105, top=0.05, dt=dt, pour=0.12, damp=0.15, free=0.05,
+                      stills=2, few={"pour": 0.05, "damp": 0.05, "free": 0.01})
+        steps, after = effort.of((4000, 4000), (40_000, 40_000), (200, 200))
+        parts.append(Part(f"ratio-{times}", "ratio.in", {"restart": bed, "L": side, "W": side, "dt": dt, "skin": 0.0003, "diameter": times * 0.002,
+                          "r": 0.00105, "steps": steps, "after": after, "rows": 20}, n + 1, steps + after, diameter=0.002))
+    return parts
+
+
+def tap():
+    """A granule is pressed down at one place, again and again."""
+    bed, n = soft_bed()
+    steps = effort.of(60_000, 1_000_000, 500)
+    return [Part("tap", "tap.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "rows": effort.of(50, 200, 50),
+                                   "before": effort.of(2000, 2000, 50)}, n + 1, steps, more=carves_thousands)]
+
+
+def carves_thousands(part, runs, grain):
+    due = effort.of(300, 3000, 0)
+    return [check(f"{part.name}, {kind}: carves, {due} at least", runs[kind].series("f_cull[8]")[1].max(), due,
+                  runs[kind].series("f_cull[8]")[1].max() >= due) for kind in ("live", "sleep")]
+
+
+def cycle():
+    """Cull and restore, again and again: of a bed at rest, and of one that creeps."""
+    cycles = effort.of(100, 1000, 4)
+    parts = []
+    for name in ("rest", "creep"):
+        bed, n = soft_bed() if name == "rest" else soft_bed(damp=0.25, free=0.005)
+        parts.append(Part(f"cycle-{name}", "cycle.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "cycles": cycles, "rows": 10,
+                                                        "before": effort.of(1000, 1000, 50) if name == "rest" else 1}, n, 60 * cycles,
+                          more=cycles_energy if effort.kind != "few" else None))
+    return parts
+
+
+def sway():
+    """Gravity leans to and fro, so that the whole body wakes each time."""
+    bed, n = soft_bed()
+    steps = effort.of(20_000, 200_000, 500)
+    return [Part("sway", "sway.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "before": effort.of(1000, 1000, 50)}, n, steps)]
+
+
+def shot():
+    """A ball at 100 m/s."""
+    n = effort.of(200, 500, 150)
+    young = 1e9
+    bed = settled("stiff-1e+09", L=BOX[0], W=BOX[1], granules=n, E=young, dt=0.22 * rayleigh_time(SMALLEST, young), top=0.08, pour=0.15, damp=0.2,
+                  free=0.03, stills=4, few={"pour": 0.01, "damp": 0.002, "free": 0.0005})
+    steps, after = effort.of((3000, 200_000), (3000, 500_000), (200, 200))
+    return [Part("shot", "shot.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "E": young, "dt": 1e-6, "lid": effort.of(0.075, 0.075, 0.106), "steps": steps, "after": after, "rows": 100,
+                                     "lost": "ignore", "speed": effort.of(100, 100, 5)}, n + 1, steps + after, lossy=True, young=young)]
+
+
+def reverse():
+    """Gravity turns round: up to the lid and back."""
+    bed, n = soft_bed()
+    turns = effort.of(4, 20, 2)
+    steps, after = effort.of((2000, 6000), (2000, 10_000), (200, 150))
+    return [Part("reverse", "reverse.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "after": after, "turns": turns}, n, steps + turns * after)]
+
+
+BLOCK, SUPPORTS = 9 * 5 * 5, 10
+
+
+def heavy():
+    """A body of 10^6 granules' mass on ten; `fix rigid` is the run beside it."""
+    steps = effort.of(50_000, 500_000, 500)
+    return [Part("heavy", "heavy.in", {"E": 1e11, "dt": 3e-7, "steps": steps, "rows": 100}, BLOCK + SUPPORTS, steps, unculled={"rigid": 1},
+                 more=does_not_sink)]
+
+
+def does_not_sink(part, runs, grain):
+    checks = []
+    for kind in ("live", "sleep"):
+        energy = sum_of(runs[kind], ("f_cull[27]", ""), ("f_cull[28]", ""))[1:]
+        z = runs[kind].series("f_cull[26]")[1]
+        half = len(energy) // 2
+        checks += [check(f"heavy, {kind}: kinetic energy in the second half, of the first's", energy[half:].max() / energy[:half].max(), 1.02),
+                   check(f"heavy, {kind}: the block sinks or rises (d)", (z.max() - z.min()) / part.diameter, 0.02),
+                   check(f"heavy, {kind}: exterior granules, most once locked", runs[kind].series("f_cull[1]")[1][2:].max(), SUPPORTS)]
+    return checks
+
+
+CASES = {f.__name__: f for f in (rest, timestep, stiffness, cohesion, ratio, tap, cycle, sway, shot, reverse, heavy)}
+
+
+# --- report ---------------------------------------------------------------------------------------------------------
+
+def row(part, figures):
+    """The figures of a part in one line for each run."""
+    lines = []
+    for kind, f in figures.items():
+        state = "stopped" if f["failure"] else "unstable" if not f["stable"] else "stable"
+        lines.append(f"{part.name:22} {kind:9} {state:9} peak {f['peak']:9.3g}  end {f['late']:9.3g} M g d  fastest {f['fastest']:8.3g} m/s"
+                     + (f"  culled {f['most_culled']:5.0f}  restored {f['restored']:8.0f}  carves {f['carves']:7.0f}" if kind != "unculled" else ""))
+    return "\n".join(lines)
+
+
+class OneLine(argparse.ArgumentParser):
+    def error(self, message):
+        raise errors.RunError(message)
+
+
+def main(argv=None):
+    p = OneLine(prog="stress.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    how = p.add_mutually_exclusive_group()
+    how.add_argument("--quick", action="store_const", dest="kind", const="quick", help="minutes (the default)")
+    how.add_argument("--full", action="store_const", dest="kind", const="full", help="an hour")
+    how.add_argument("--few-steps", action="store_const", dest="kind", const="few", help="no bars: does every deck run?")
+    p.add_argument("case", nargs="*", metavar="CASE", help="default: all; " + ", ".join(CASES))
+    a = p.parse_args(argv)
+    unknown = [c for c in a.case if c not in CASES]
+    if unknown:
+        raise errors.RunError(f"no case {unknown[0]}; there is: {' '.join(CASES)}")
+    effort.kind = a.kind or "quick"
+    effort.out.mkdir(parents=True, exist_ok=True)
+    cases = {name: CASES[name]() for name in a.case or CASES}
+    whole, done, made, good, began = sum(part.work() for parts in cases.values() for part in parts), 0, 0, True, time.monotonic()
+    for name, parts in cases.items():
+        print(f"\n=== {name}: {CASES[name].__doc__}", flush=True)
+        checks, report = [], {}
+        for part in parts:
+            started = time.monotonic()
+            runs = run_part(part, lambda line: print(f"  {part.name}: {line}", flush=True))
+            of_part, figures = judge(part, runs)
+            checks += of_part
+            report[part.name] = figures
+            done += part.work()
+            now = time.monotonic()
+            made += part.work() if now - started > 0.5 else 0
+            left = (whole - done) * (now - began) / made if made else 0
+            print(row(part, figures) + (f"\n  about {left / 60:.1f} min left" if left else ""), flush=True)
+        good = all(c["good"] for c in checks) and good
+        print("\n".join(["", *tables.check_rows(checks)]), flush=True)
+        (effort.out / f"{name}.json").write_text(json.dumps({"good": all(c["good"] for c in checks), "parts": report, "checks": checks}, indent=1) + "\n")
+    return 0 if good or effort.kind == "few" else 1
+
+
+if __name__ == "__main__":
+    errors.command("stress", main)
