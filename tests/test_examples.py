@@ -153,13 +153,31 @@ class Validation(Scripts):
                         self.close(part, 0.01, "bed height (m)", "centre of mass (m)")
                     if scene == "shake":
                         self.close(part, 0.02, "floor load, largest (N)", "floor load, mean (N)")
-        stability = json.loads((out / "stability.json").read_text())
-        self.assertEqual(len(stability["figures"]["matrix"]), 6)
-        held = {c["what"]: c["good"] for c in stability["checks"] if "heavy" in c["what"] and "energy" not in c["what"]}
-        self.assertEqual(list(held.values()), [True] * 3, held)
-        for name, part in stability["figures"]["matrix"].items():
-            if "1e+09" in name:  # nothing is culled there, so nothing differs
-                self.assertEqual(part["culled"], part["unculled"], name)
+
+    def test_stress(self):
+        out = ROOT / "validation" / "stress" / "out" / "few"
+        self.run_script(ROOT / "validation" / "stress" / "stress.py", out / "rest.json")
+        parts = {case: json.loads((out / f"{case}.json").read_text())["parts"] for case in (
+            "rest", "timestep", "stiffness", "cohesion", "ratio", "tap", "cycle", "sway", "shot", "reverse", "heavy")}
+        for case, of_case in parts.items():
+            for name, part in of_case.items():
+                for kind in ("unculled", "live", "sleep"):
+                    with self.subTest(part=name, kind=kind):
+                        self.assertEqual((part[kind]["failure"], part[kind]["finite"], part[kind]["lost"]), (None, True, 0))
+                        if kind != "unculled" and case not in ("stiffness", "shot"):  # stiff beds, their steps short, still fall
+                            self.assertGreater(part[kind]["most_culled"], 0)
+                if case in ("stiffness", "shot"):  # nothing is culled, so nothing differs
+                    self.assertEqual(part["live"]["peak"], part["unculled"]["peak"])
+        self.assertEqual({name: part["live"]["most_culled"] for name, part in parts["heavy"].items()}, {"heavy": 225})
+        for of_case in (parts["sway"], parts["tap"]):  # they are for restores
+            for part in of_case.values():
+                self.assertGreater(part["live"]["restored"], 100)
+
+    def test_stress_refuses_in_one_line(self):
+        script = ROOT / "validation" / "stress" / "stress.py"
+        self.assertIn("stress: no case nowhere; there is: rest timestep", self.run_script(script, None, "nowhere", status=2))
+        self.assertIn("stress: unrecognized arguments: --quik", self.run_script(script, None, "--quik", status=2))
+        self.assertIn("stress: argument --full: not allowed with argument --few-steps", self.run_script(script, None, "--full", status=2))
 
     def test_scale(self):
         folder = ROOT / "validation" / "scale"
@@ -234,13 +252,13 @@ sys.exit(status)
 class Spoiled(Scripts):
     """What a few steps must not let pass, in a real run: one line, status 2."""
 
-    def spoiled(self, change="pass", lose=False):
+    def spoiled(self, change="pass", lose=False, suite="motion", scene="drop"):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         launcher = Path(folder.name) / "launcher"
         launcher.write_text(SPOILER.format(change=change, lose=lose, launcher=LAUNCHER))
         launcher.chmod(launcher.stat().st_mode | stat.S_IXUSR)
-        said = self.run_script(ROOT / "validation" / "motion" / "motion.py", None, "drop", launcher=str(launcher), status=2)
+        said = self.run_script(ROOT / "validation" / suite / f"{suite}.py", None, scene, launcher=str(launcher), status=2)
         self.assertEqual(said.count("\n"), 1, said)
         return said
 
@@ -254,6 +272,13 @@ class Spoiled(Scripts):
 
     def test_a_granule_that_is_lost(self):
         self.assertIn("motion: drop-flat, few steps: culled-1 ended with 255 granules of 255 ids, not 256", self.spoiled(lose=True))
+
+    def test_stress_tells_a_lost_granule(self):
+        self.assertIn("stress: sway, few steps: live ended with 149 granules of 149 ids, not 150", self.spoiled(lose=True, suite="stress", scene="sway"))
+
+    def test_stress_tells_a_deck_that_ends_early(self):
+        self.assertIn("stress: sway, few steps: live made 0 steps after the fix line, not 500",
+                      self.spoiled(r"""deck = re.sub(r"(?m)^run \$\{steps\}$", "run 0", deck)""", suite="stress", scene="sway"))
 
 
 if __name__ == "__main__":

@@ -490,13 +490,13 @@ class Drivers(unittest.TestCase):
 
     DRIVERS = ("examples/impact/example.py", "examples/drum/example.py", "examples/falling_mass/example.py", "examples/plate_discharge/example.py",
                "validation/motion/motion.py", "validation/scale/scale.py", "validation/scale/choices.py", "validation/scale/weight.py",
-               "validation/activity/activity.py")
+               "validation/activity/activity.py", "validation/stress/stress.py")
 
     def test_no_launcher(self):
         for driver in self.DRIVERS:
             with self.subTest(driver=driver):
                 # of few steps, so that beds of a user's own runs stay as they are
-                scene = ["tilt"] if "motion" in driver else ["gas"] if "activity" in driver else []
+                scene = ["tilt"] if "motion" in driver else ["gas"] if "activity" in driver else ["heavy"] if "stress" in driver else []
                 done = subprocess.run(["/usr/bin/python3", str(ROOT / driver), "--few-steps", *scene], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                       stderr=subprocess.PIPE, text=True, timeout=100, env={**os.environ, engine.NAMED_BY: "/nowhere/liggghts-solidcull"})
                 self.assertEqual(done.returncode, 2, done.stderr)

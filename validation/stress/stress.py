@@ -108,7 +108,7 @@ SMALLEST = 0.0023     # m: the smaller radius in them
 
 def soft_bed(**more):
     """Granules of 5 mm, E = 5e6."""
-    n = effort.of(300, 1000, 150)
+    n = effort.of(300, 500, 150)
     name = "soft" + "".join(f"-{k}{v:g}" for k, v in more.items())
     return settled(name, granules=n, L=BOX[0], W=BOX[1], stills=3, **more), n
 
@@ -265,21 +265,19 @@ def of_stable(what, part, c, run, unculled, beside, unit):
 # --- energy of a bed ------------------------------------------------------------------------------------------------
 
 def mechanical_energy(g, young, size):
-    """Energy (J) of a bed in its box from places, velocities and spins: kinetic, of height, and elastic of the normal contacts after
-    Hertz, of granules, floor and sides. Tangential springs are left out: they are in no dump."""
+    """Energy (J) of a bed in its box from places, velocities and spins: kinetic, of height, and elastic of the
+    normal contacts after Hertz, with granules, floor and sides. Tangential springs are left out: they are in no dump."""
     m, r, x = g["mass"], g["radius"], np.stack([g[c] for c in "xyz"], 1)
     kinetic = 0.5 * (m * sum(g[c]**2 for c in ("vx", "vy", "vz"))).sum()
     kinetic += 0.2 * (m * r**2 * sum(g[c]**2 for c in ("omegax", "omegay", "omegaz"))).sum()
-    modulus = young / (2 * (1 - POISSON**2))
-    elastic = 0.0
-    for i in range(len(r) - 1):
-        overlap = r[i] + r[i + 1:] - np.sqrt(((x[i + 1:] - x[i])**2).sum(1))
-        k = overlap > 0
-        elastic += (np.sqrt(r[i] * r[i + 1:][k] / (r[i] + r[i + 1:][k])) * overlap[k]**2.5).sum()
+    i, j = np.triu_indices(len(r), 1)
+    near = np.abs(x[i, 2] - x[j, 2]) < 2 * r.max()
+    i, j = i[near], j[near]
+    overlap = np.maximum(r[i] + r[j] - np.sqrt(((x[i] - x[j])**2).sum(1)), 0)
+    springs = (np.sqrt(r[i] * r[j] / (r[i] + r[j])) * overlap**2.5).sum()
     for gap in (x[:, 0], size[0] - x[:, 0], x[:, 1], size[1] - x[:, 1], x[:, 2]):
-        overlap = np.maximum(r - gap, 0)
-        elastic += (np.sqrt(r) * overlap**2.5).sum()
-    return kinetic + GRAVITY * (m * x[:, 2]).sum() + 8 / 15 * modulus * elastic
+        springs += (np.sqrt(r) * np.maximum(r - gap, 0)**2.5).sum()
+    return kinetic + GRAVITY * (m * x[:, 2]).sum() + 8 / 15 * young / (2 * (1 - POISSON**2)) * springs
 
 
 def read_whole(file):
@@ -288,11 +286,11 @@ def read_whole(file):
 
 
 def cycles_energy(part, runs, grain):
-    """What the bed's energy rises by while culled, over all cycles, against the unculled run."""
+    """What the bed's energy rises by from each cull to the restore, over all cycles, more than in the unculled run."""
     def rises(name):
         total = 0.0
         for k in range(1, part.variables["cycles"] + 1):
-            a, b = (mechanical_energy(read_whole(part.out() / f"{name}.{k}.{when}"), 5e6, BOX) for when in ("culled", "restored"))
+            a, b = (mechanical_energy(read_whole(part.out() / f"{name}.{k}.{when}"), part.young, BOX) for when in ("culled", "restored"))
             total += max(0.0, b - a)
         return total
 
@@ -302,7 +300,7 @@ def cycles_energy(part, runs, grain):
                 if t.counted and t.rows and t.column("f_cull[2]") is not None]
         restored = sum(last)
         checks.append(check(f"{part.name}, {kind}: rise of mechanical energy while culled, of m g d per granule restored",
-                            max(0.0, rises(kind) - unculled) / grain / max(1, restored), INJECTED))
+                            (rises(kind) - unculled) / grain / max(1, restored), INJECTED))
         checks.append(check(f"{part.name}, {kind}: cycles in which nothing was culled", sum(n == 0 for n in last), part.variables["cycles"] // 10))
     return checks
 
@@ -339,7 +337,7 @@ def struck(name, bed, n, young, share, at_limit=False, blow=0.5, times=None, **m
     whole = rayleigh_time(SMALLEST, young)
     dt = share * whole
     steps = effort.of(2000, 5000, 200)
-    wait, after = (100, 200) if effort.kind == "few" else (round(t / dt) for t in times or effort.of((0.1, 0.4), (0.5, 1.5), None))
+    wait, after = (100, 200) if effort.kind == "few" else (round(t / dt) for t in times or effort.of((0.1, 0.4), (0.3, 0.8), None))
     return Part(name, "blow.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "E": young, "first_dt": SETTLED * whole, "dt": dt, "steps": steps,
                                   "wait": wait, "after": after, "blow": blow, "before": effort.of(500, 1000, 50), "rows": 20, **more},
                 n, steps + wait + after, at_limit=at_limit, young=young)
@@ -348,7 +346,7 @@ def struck(name, bed, n, young, share, at_limit=False, blow=0.5, times=None, **m
 def timestep():
     """Ever larger time steps, in percent of the Rayleigh time, until the unculled run is unstable and beyond."""
     bed, n = soft_bed()
-    shares = effort.of((10, 20, 30, 35, 40, 45, 50, 70), (5, 10, 15, 20, 25, 30, 32, 34, 36, 38, 40, 42, 44, 46, 48, 50, 55, 60, 70, 80, 100, 150), (10, 30))
+    shares = effort.of((10, 20, 30, 35, 40, 45, 50, 70), (5, 10, 15, 20, 25, 28, 30, 32, 34, 36, 38, 40, 45, 50, 60, 80), (10, 30))
     return [struck(f"timestep-{s}", bed, n, 5e6, s / 100, s / 100 > SURE) for s in shares]
 
 
@@ -360,7 +358,7 @@ def stiffness():
         whole = rayleigh_time(SMALLEST, young)
         bed = settled(f"stiff-{young:g}", L=BOX[0], W=BOX[1], granules=n, E=young, dt=0.22 * whole, top=0.08, pour=0.15, damp=0.2, free=0.03,
                       stills=4, few={"pour": 0.01, "damp": 0.002, "free": 0.0005})
-        for share in effort.of((25, 60), (5, 15, 25, 40, 60, 80, 100), (25,)):
+        for share in effort.of((25, 60), (15, 25, 40, 60, 80), (25,)):
             parts.append(struck(f"stiffness-{young:g}-{share}", bed, n, young, share / 100, share / 100 > SURE, blow=0.2,
                                 times=effort.of((0.02, 0.3), (0.1, 0.6), None)))
     if effort.kind != "few":
@@ -385,7 +383,7 @@ def cohesion():
 def ratio():
     """One granule of 10 and 20 times the diameter falls on small ones, and is pushed aside."""
     parts = []
-    for times, side, quick, full in effort.of(((10, 0.03, 800, 0), (20, 0.045, 1500, 0)), ((10, 0.04, 0, 2000), (20, 0.06, 0, 5000)), ((20, 0.045, 0, 0),)):
+    for times, side, quick, full in effort.of(((10, 0.03, 800, 0), (20, 0.045, 1500, 0)), ((10, 0.04, 0, 2000), (20, 0.05, 0, 3000)), ((20, 0.045, 0, 0),)):
         n = effort.of(quick, full, 150)
         dt = 0.2 * rayleigh_time(0.00095, 5e6)
         bed = settled(f"fine-{times}", L=side, W=side, granules=n, small=0.00095, large=0.00105, top=0.05, dt=dt, pour=0.12, damp=0.15, free=0.05,
@@ -399,7 +397,7 @@ def ratio():
 def tap():
     """A granule is pressed down at one place, again and again."""
     bed, n = soft_bed()
-    steps = effort.of(60_000, 1_000_000, 500)
+    steps = effort.of(60_000, 400_000, 500)
     return [Part("tap", "tap.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "rows": effort.of(50, 200, 50),
                                    "before": effort.of(2000, 2000, 50)}, n + 1, steps, more=carves_thousands)]
 
@@ -412,10 +410,10 @@ def carves_thousands(part, runs, grain):
 
 def cycle():
     """Cull and restore, again and again: of a bed at rest, and of one that creeps."""
-    cycles = effort.of(100, 1000, 4)
+    cycles = effort.of(100, 500, 4)
     parts = []
     for name in ("rest", "creep"):
-        bed, n = soft_bed() if name == "rest" else soft_bed(damp=0.25, free=0.005)
+        bed, n = soft_bed(damp=0.25, free=0.005) if name == "creep" else soft_bed()
         parts.append(Part(f"cycle-{name}", "cycle.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "cycles": cycles, "rows": 10,
                                                         "before": effort.of(1000, 1000, 50) if name == "rest" else 1}, n, 60 * cycles, once=True,
                           more=cycles_energy if effort.kind != "few" else None))
@@ -425,7 +423,7 @@ def cycle():
 def sway():
     """Gravity leans to and fro, so that the whole body wakes each time."""
     bed, n = soft_bed()
-    steps = effort.of(20_000, 200_000, 500)
+    steps = effort.of(20_000, 100_000, 500)
     return [Part("sway", "sway.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "before": effort.of(1000, 1000, 50)}, n, steps)]
 
 
@@ -435,7 +433,7 @@ def shot():
     young = 1e9
     bed = settled("stiff-1e+09", L=BOX[0], W=BOX[1], granules=n, E=young, dt=0.22 * rayleigh_time(SMALLEST, young), top=0.08, pour=0.15, damp=0.2,
                   free=0.03, stills=4, few={"pour": 0.01, "damp": 0.002, "free": 0.0005})
-    steps, after = effort.of((3000, 200_000), (3000, 500_000), (200, 200))
+    steps, after = effort.of((3000, 200_000), (3000, 300_000), (200, 200))
     return [Part("shot", "shot.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "E": young, "dt": 1e-6, "lid": effort.of(0.075, 0.075, 0.106), "steps": steps, "after": after, "rows": 100,
                                      "lost": "ignore", "speed": effort.of(100, 100, 5)}, n + 1, steps + after, lossy=True, young=young)]
 
@@ -443,7 +441,7 @@ def shot():
 def reverse():
     """Gravity turns round: up to the lid and back."""
     bed, n = soft_bed()
-    turns = effort.of(4, 20, 2)
+    turns = effort.of(4, 10, 2)
     steps, after = effort.of((2000, 6000), (2000, 10_000), (200, 150))
     return [Part("reverse", "reverse.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "after": after, "turns": turns}, n, steps + turns * after)]
 
