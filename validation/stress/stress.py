@@ -132,7 +132,7 @@ class StressJob(twins.KeptJob):
 
     def stopped(self, failure, wall, cpu):
         tables_ = logs.parse_log(self.file(".log").read_text(errors="replace"))
-        run = twins.Run(self.name, tables_, logs.loop_time(tables_), wall=wall, cpu=cpu)
+        run = twins.Run(self.name, tables_, logs.loop_time(tables_), counts={} if self.kind == "culled" else None, wall=wall, cpu=cpu)
         run.failure = failure
         return run
 
@@ -189,7 +189,7 @@ class Figures:
         if run.final is not None:
             self.finite = self.finite and all(np.isfinite(run.final[c]).all() for c in ("mass", "x", "y", "z"))
             self.lost = granules - len(np.unique(run.final["id"]))
-        culled = run.counts is not None
+        culled = run.counts is not None and len(values) > 0
         self.restored = float(run.series("f_cull[7]")[1].max()) if culled else 0.0
         self.carves = float(run.series("f_cull[8]")[1].max()) if culled else 0.0
         self.most_culled = float((run.series("f_cull[2]")[1] + run.series("f_cull[3]")[1]).max()) if culled else 0.0
