@@ -421,6 +421,14 @@ class Progress(Folder):
         self.assertAlmostEqual(progress.seconds_left(both), (50 + 12.5 + 100 + 62.5) / 2, delta=1)
         self.assertIsNone(progress.seconds_left([both[0], self.running(culled, 50, 10)]), "too early to tell")
 
+    def test_where_all_unculled_runs_were_made_before(self):
+        _, progress = self.progress()
+        made = types.SimpleNamespace(name="unculled-1", loop_time=1.0)
+        for _ in range(2):
+            progress.skipped(made, "unculled")
+        progress.walls["culled"] = [20.0]
+        self.assertEqual(progress.seconds_left([]), 20 / 2)
+
 
 class Kept(Folder):
     def test_a_bed_is_made_again_when_its_recipe_changes(self):
