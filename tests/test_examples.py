@@ -168,7 +168,7 @@ class Validation(Scripts):
                             self.assertGreater(part[kind]["most_culled"], 0)
                 if case in ("stiffness", "shot"):  # nothing is culled, so nothing differs
                     self.assertEqual(part["live"]["peak"], part["unculled"]["peak"])
-        self.assertEqual({name: part["live"]["most_culled"] for name, part in parts["heavy"].items()}, {"heavy": 225})
+        self.assertEqual({name: part["live"]["most_culled"] for name, part in parts["heavy"].items()}, {"heavy-300ns": 225})
         for of_case in (parts["sway"], parts["tap"]):  # they are for restores
             for part in of_case.values():
                 self.assertGreater(part["live"]["restored"], 100)

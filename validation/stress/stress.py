@@ -66,7 +66,8 @@ class Part:
     at_limit: bool = False          # unculled may be unstable
     lossy: bool = False             # unculled may lose granules
     alone: dict = field(default_factory=dict)  # variables of the unculled run alone
-    asleep: str = ""                # more keywords of the run with `exterior sleep`
+    keywords: str = ""              # more of them on the fix line
+    asleep: str = ""                # and of the run with `exterior sleep`
     once: bool = False              # one unculled run is enough, or all that there can be; else three, 1e-5 d apart
     more: object = None             # more(part, runs): more checks
     diameter: float = 0.005         # m: the d of m g d
@@ -160,10 +161,9 @@ def run_part(part, say):
         kind = "culled" if keywords else "unculled"
         variables = {"start_dump": (part.out() / "start.dump").relative_to(HERE), "folder": part.out().relative_to(HERE), **part.variables,
                      **(part.alone if not keywords else {})}
-        if name == "sleep":
-            keywords += part.asleep
-        if keywords and effort.kind == "few" and part.name != "heavy":
-            keywords += " " + FEW_KEYWORDS
+        if keywords:
+            few_keywords = FEW_KEYWORDS if effort.kind == "few" and part.deck != "heavy.in" else ""
+            keywords = " ".join(filter(None, (keywords, part.keywords, part.asleep if name == "sleep" else "", few_keywords)))
         made_with = hashlib.sha1((sources + bed + (engine.hash_of_fix(launcher) if keywords else "")).encode()).hexdigest()
         jobs.append(StressJob(HERE / part.deck, part.out(), kind, 0 if keywords else k, variables, launcher=launcher, keywords=keywords, name=name,
                               made_with=made_with))
@@ -409,13 +409,14 @@ def carves_thousands(part, runs, grain):
 
 
 def cycle():
-    """Cull and restore, again and again: of a bed at rest, and of one that creeps."""
+    """Cull and restore, again and again: of a bed at rest, from either store, and of one that creeps."""
     cycles = effort.of(100, 500, 4)
     parts = []
-    for name in ("rest", "creep"):
+    for name in ("rest", "creep", "compact"):
         bed, n = soft_bed(damp=0.25, free=0.005) if name == "creep" else soft_bed()
         parts.append(Part(f"cycle-{name}", "cycle.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "cycles": cycles, "rows": 10,
-                                                        "before": effort.of(1000, 1000, 50) if name == "rest" else 1}, n, 60 * cycles, once=True,
+                                                        "before": 1 if name == "creep" else effort.of(1000, 1000, 50)}, n, 60 * cycles, once=True,
+                          keywords="store compact" if name == "compact" else "",
                           more=cycles_energy if effort.kind != "few" else None))
     return parts
 
@@ -450,10 +451,13 @@ BLOCK, SUPPORTS = 9 * 5 * 5, 10
 
 
 def heavy():
-    """A body of 10^6 granules' mass on ten; `fix rigid` is the run beside it."""
-    steps = effort.of(50_000, 500_000, 500)
-    return [Part("heavy", "heavy.in", {"E": 1e11, "dt": 3e-7, "steps": steps, "rows": 100}, BLOCK + SUPPORTS, steps, alone={"rigid": 1}, once=True, asleep=" depth 0",
-                 more=does_not_sink)]
+    """A body of 10^6 granules' mass on ten, two time steps; `fix rigid` is the run beside it."""
+    parts = []
+    for dt in effort.of((3e-7, 1e-6), (3e-7, 6e-7, 1e-6), (3e-7,)):
+        steps = effort.of(round(0.015 / dt), round(0.15 / dt), 500)
+        parts.append(Part(f"heavy-{1e9 * dt:g}ns", "heavy.in", {"E": 1e11, "dt": dt, "steps": steps, "rows": 100}, BLOCK + SUPPORTS, steps,
+                          alone={"rigid": 1}, once=True, asleep="depth 0", more=does_not_sink if effort.kind != "few" else None))
+    return parts
 
 
 def does_not_sink(part, runs, grain):
@@ -462,9 +466,10 @@ def does_not_sink(part, runs, grain):
         energy = sum_of(runs[kind][0], ("f_cull[27]", ""), ("f_cull[28]", ""))[1:]
         z = runs[kind][0].series("f_cull[26]")[1]
         half = len(energy) // 2
-        checks += [check(f"heavy, {kind}: kinetic energy in the second half, of the first's", energy[half:].max() / energy[:half].max(), 1.02),
-                   check(f"heavy, {kind}: the block sinks or rises (d)", (z.max() - z.min()) / part.diameter, 0.02),
-                   check(f"heavy, {kind}: exterior granules, most once locked", runs[kind][0].series("f_cull[1]")[1][2:].max(), SUPPORTS)]
+        what = f"{part.name}, {kind}: "
+        checks += [check(what + "kinetic energy in the second half, of the first's", energy[half:].max() / energy[:half].max(), 1.02),
+                   check(what + "the block sinks or rises (d)", (z.max() - z.min()) / part.diameter, 0.02),
+                   check(what + "exterior granules, most once locked", runs[kind][0].series("f_cull[1]")[1][2:].max(), SUPPORTS)]
     return checks
 
 
