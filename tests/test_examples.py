@@ -3,6 +3,7 @@
 The scripts themselves check what holds for any deck (solidcull_runs/few_steps.py) and end with 2 where it does not. Here stands what
 is known of a scene without any run: numbers of granules, formulas, and what culling cannot change.
 """
+import importlib.util
 import json
 import os
 import shutil
@@ -10,6 +11,7 @@ import stat
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
 from pathlib import Path
 
@@ -229,6 +231,60 @@ class Validation(Scripts):
                     elif part["culled"]["culled"] == 0:  # then nothing differs
                         m = part["metrics"]["kinetic energy, mean (J)"]
                         self.assertEqual(m["culled"], m["unculled"])
+
+
+class StressBars(unittest.TestCase):
+    """The bars of validation/stress, with figures made up."""
+
+    def setUp(self):
+        spec = importlib.util.spec_from_file_location("stress", ROOT / "validation" / "stress" / "stress.py")
+        self.stress = importlib.util.module_from_spec(spec)
+        sys.modules["stress"] = self.stress  # dataclasses look there
+        spec.loader.exec_module(self.stress)
+        self.part = self.stress.Part("made-up", "rest.in", {}, 3, 10, calm=1e-4)
+        self.end = np.array([(1, 0.5), (2, 0.5), (3, 0.5)], [("id", int), ("mass", float)])
+
+    def figures(self, **others):
+        return types.SimpleNamespace(**{"failure": None, "finite": True, "lost": 0, "peak": 2.0, "late": 0.5, "fastest": 1.0, "added": 0.0, "restored": 10, **others})
+
+    def missed(self, part=None, end=None, **culled):
+        def run(final):
+            return types.SimpleNamespace(final=final)
+        checks = self.stress.of_stable("", part or self.part, self.figures(**culled), run(self.end if end is None else end), [self.figures()], run(self.end), 3.0)
+        return [c["what"] for c in checks if not c["good"]]
+
+    def test_each_bar(self):
+        self.assertEqual(self.missed(), [])
+        for culled, bar in (({"finite": False}, "stopped, or not finite"), ({"peak": 2.3}, "kinetic energy, largest (M g d)"),
+                            ({"late": 1.1}, "kinetic energy, last tenth (M g d)"), ({"fastest": 1.6}, "largest speed (m/s)"),
+                            ({"added": 1.1e-5}, "energy added, of m g d per granule restored"), ({"late": float("nan")}, "kinetic energy, last tenth (M g d)")):
+            self.assertEqual(self.missed(**culled), [bar])
+        self.assertEqual(self.missed(added=0.9e-5), [])
+
+    def test_nothing_may_be_lost(self):
+        self.assertEqual(self.missed(lost=1, end=self.end[:2]), ["granules lost"])
+        lighter = self.end.copy()
+        lighter["mass"][0] = 0.4999
+        self.assertEqual(self.missed(end=lighter), ["granules lost"])
+        self.part.lossy = True
+        self.assertEqual(self.missed(end=lighter), [])
+
+    def test_where_unculled_is_unstable_a_line_is_enough_and_a_crash_is_not(self):
+        for failure, good in ((None, True), ("live: LIGGGHTS stopped with status 1: ERROR: Lost atoms", True),
+                              ("live: LIGGGHTS was killed by signal 11 (SIGSEGV): ERROR: x", False), ("live: LIGGGHTS stopped with status 1: it printed nothing", False)):
+            check, = self.stress.of_unstable("", self.part, self.figures(failure=failure), None, None, None, 1.0)
+            self.assertEqual(check["good"], good, failure)
+
+    def test_mechanical_energy(self):
+        columns = "mass radius x y z vx vy vz omegax omegay omegaz".split()
+        r, m, depth = 0.01, 2.0, 1e-4
+        apart = dict(zip(columns, np.array([[m, r, 0.05, 0.05, r - depth, 3, 0, 4, 0, 5, 0], [m, r, 0.05, 0.05, 0.5, 0, 0, 0, 0, 0, 0]]).T))
+        modulus = 5e6 / (2 * (1 - 0.3**2))
+        due = m * 25 / 2 + 0.2 * m * r**2 * 25 + m * GRAVITY * (r - depth + 0.5) + 8 / 15 * modulus * r**0.5 * depth**2.5
+        self.assertAlmostEqual(self.stress.mechanical_energy(apart, 5e6, (0.1, 0.1)) / due, 1, delta=1e-12)
+        apart["z"] = np.array([0.5 - 2 * r + depth, 0.5])
+        due += m * GRAVITY * (0.5 - 2 * r + depth - r + depth) + 8 / 15 * modulus * ((r / 2)**0.5 - r**0.5) * depth**2.5
+        self.assertAlmostEqual(self.stress.mechanical_energy(apart, 5e6, (0.1, 0.1)) / due, 1, delta=1e-12)
 
 
 # stands before the launcher and spoils the run

@@ -186,6 +186,7 @@ class Figures:
             tenth = max(1, len(energy) // 10)
             self.peak, self.late = float(energy.max()), float(energy[-tenth:].max())
             self.fastest = float(run.series("v_fastest")[1][1:].max())
+        self.finite = self.finite and all(np.isfinite(column).all() for column in (run.counts or {}).values())
         if run.final is not None:
             self.finite = self.finite and all(np.isfinite(run.final[c]).all() for c in ("mass", "x", "y", "z"))
             self.lost = granules - len(np.unique(run.final["id"]))
@@ -422,10 +423,12 @@ def cycle():
 
 
 def sway():
-    """Gravity leans to and fro, so that the whole body wakes each time."""
+    """Gravity leans to and fro: less than wakes a body, near the bed's own frequency; so that all wakes each time; and far."""
     bed, n = soft_bed()
     steps = effort.of(20_000, 100_000, 500)
-    return [Part("sway", "sway.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "before": effort.of(1000, 1000, 50)}, n, steps)]
+    return [Part("sway" if swing == 4 else f"sway-{swing:g}", "sway.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "swing": swing, "period": period,
+                                                                       "before": effort.of(1000, 1000, 50)}, n, steps)
+            for swing, period in ((0.5, 100), (4, 400), (20, 400))[effort.of(0, 0, 1):effort.of(3, 3, 2)]]
 
 
 def shot():
