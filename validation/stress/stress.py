@@ -382,9 +382,9 @@ def stiffness():
 
 
 def cohesion():
-    """Granules that stick, SJKR."""
+    """Granules that stick, SJKR, ever more, until the unculled run does not come to rest."""
     bed, n = soft_bed()
-    return [struck(f"cohesion-{c:g}", bed, n, 5e6, 0.15, glue="sticky", cohesion=c) for c in effort.of((3e4, 1e5), (1e4, 3e4, 1e5, 2e5), (1e5,))]
+    return [struck(f"cohesion-{c:g}", bed, n, 5e6, 0.15, c > 3e4, glue="sticky", cohesion=c) for c in effort.of((1e4, 3e4, 1e5), (1e4, 3e4, 5e4, 1e5, 2e5), (1e5,))]
 
 
 def ratio():
@@ -404,7 +404,7 @@ def ratio():
 def tap():
     """A granule is pressed down at one place, again and again."""
     bed, n = soft_bed()
-    steps = effort.of(60_000, 400_000, 500)
+    steps = effort.of(60_000, 200_000, 500)
     return [Part("tap", "tap.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "rows": effort.of(50, 200, 50),
                                    "before": effort.of(2000, 2000, 50)}, n + 1, steps, more=carves_thousands)]
 
@@ -431,7 +431,7 @@ def cycle():
 def sway():
     """Gravity leans to and fro: less than wakes a body, near the bed's own frequency; so that all wakes each time; and far."""
     bed, n = soft_bed()
-    steps = effort.of(20_000, 100_000, 500)
+    steps = effort.of(20_000, 50_000, 500)
     return [Part("sway" if swing == 4 else f"sway-{swing:g}", "sway.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "swing": swing, "period": period,
                                                                        "before": effort.of(1000, 1000, 50)}, n, steps)
             for swing, period in ((0.5, 100), (4, 400), (20, 400))[effort.of(0, 0, 1):effort.of(3, 3, 2)]]
