@@ -377,7 +377,7 @@ def stiffness():
                 dt = share / 100 * whole
                 steps = effort.of(8000, 20000, 300)
                 parts.append(Part(f"stiffness-mix-{young:g}-{share}", "rest.in", {"restart": bed, "L": 0.012, "W": 0.012, "E": young, "dt": dt,
-                                  "skin": 0.00015, "before": 100, "rows": 20, "steps": steps}, 450, steps, 1e-3, diameter=0.001))
+                                  "skin": 0.00015, "before": 100, "rows": 20, "steps": steps}, 450, steps, STILL, once=True, diameter=0.001, young=young))
     return parts
 
 
@@ -451,7 +451,7 @@ def shot():
 def reverse():
     """Gravity turns round: up to the lid and back."""
     bed, n = soft_bed()
-    turns = effort.of(4, 10, 2)
+    turns = effort.of(4, 6, 2)
     steps, after = effort.of((2000, 6000), (2000, 10_000), (200, 150))
     return [Part("reverse", "reverse.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "after": after, "turns": turns}, n, steps + turns * after)]
 
