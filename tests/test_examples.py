@@ -3,6 +3,7 @@
 The scripts themselves check what holds for any deck (solidcull_runs/few_steps.py) and end with 2 where it does not. Here stands what
 is known of a scene without any run: numbers of granules, formulas, and what culling cannot change.
 """
+import importlib.util
 import json
 import os
 import shutil
@@ -10,6 +11,7 @@ import stat
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
 from pathlib import Path
 
@@ -153,13 +155,31 @@ class Validation(Scripts):
                         self.close(part, 0.01, "bed height (m)", "centre of mass (m)")
                     if scene == "shake":
                         self.close(part, 0.02, "floor load, largest (N)", "floor load, mean (N)")
-        stability = json.loads((out / "stability.json").read_text())
-        self.assertEqual(len(stability["figures"]["matrix"]), 6)
-        held = {c["what"]: c["good"] for c in stability["checks"] if "heavy" in c["what"] and "energy" not in c["what"]}
-        self.assertEqual(list(held.values()), [True] * 3, held)
-        for name, part in stability["figures"]["matrix"].items():
-            if "1e+09" in name:  # nothing is culled there, so nothing differs
-                self.assertEqual(part["culled"], part["unculled"], name)
+
+    def test_stress(self):
+        out = ROOT / "validation" / "stress" / "out" / "few"
+        self.run_script(ROOT / "validation" / "stress" / "stress.py", out / "rest.json")
+        parts = {case: json.loads((out / f"{case}.json").read_text())["parts"] for case in (
+            "rest", "timestep", "stiffness", "cohesion", "ratio", "tap", "cycle", "sway", "shot", "reverse", "heavy")}
+        for case, of_case in parts.items():
+            for name, part in of_case.items():
+                for kind in ("unculled", "live", "sleep"):
+                    with self.subTest(part=name, kind=kind):
+                        self.assertEqual((part[kind]["failure"], part[kind]["finite"], part[kind]["lost"]), (None, True, 0))
+                        if kind != "unculled" and case not in ("stiffness", "shot"):  # stiff beds, their steps short, still fall
+                            self.assertGreater(part[kind]["most_culled"], 0)
+                if case in ("stiffness", "shot"):  # nothing is culled, so nothing differs
+                    self.assertEqual(part["live"]["peak"], part["unculled"]["peak"])
+        self.assertEqual({name: part["live"]["most_culled"] for name, part in parts["heavy"].items()}, {"heavy-300ns": 225})
+        for of_case in (parts["sway"], parts["tap"]):  # they are for restores
+            for part in of_case.values():
+                self.assertGreater(part["live"]["restored"], 100)
+
+    def test_stress_refuses_in_one_line(self):
+        script = ROOT / "validation" / "stress" / "stress.py"
+        self.assertIn("stress: no case nowhere; there is: rest timestep", self.run_script(script, None, "nowhere", status=2))
+        self.assertIn("stress: unrecognized arguments: --quik", self.run_script(script, None, "--quik", status=2))
+        self.assertIn("stress: argument --full: not allowed with argument --few-steps", self.run_script(script, None, "--full", status=2))
 
     def test_scale(self):
         folder = ROOT / "validation" / "scale"
@@ -213,6 +233,60 @@ class Validation(Scripts):
                         self.assertEqual(m["culled"], m["unculled"])
 
 
+class StressBars(unittest.TestCase):
+    """The bars of validation/stress, with figures made up."""
+
+    def setUp(self):
+        spec = importlib.util.spec_from_file_location("stress", ROOT / "validation" / "stress" / "stress.py")
+        self.stress = importlib.util.module_from_spec(spec)
+        sys.modules["stress"] = self.stress  # dataclasses look there
+        spec.loader.exec_module(self.stress)
+        self.part = self.stress.Part("made-up", "rest.in", {}, 3, 10, calm=1e-4)
+        self.end = np.array([(1, 0.5), (2, 0.5), (3, 0.5)], [("id", int), ("mass", float)])
+
+    def figures(self, **others):
+        return types.SimpleNamespace(**{"failure": None, "finite": True, "lost": 0, "peak": 2.0, "late": 0.5, "fastest": 1.0, "added": 0.0, "restored": 10, **others})
+
+    def missed(self, part=None, end=None, **culled):
+        def run(final):
+            return types.SimpleNamespace(final=final)
+        checks = self.stress.of_stable("", part or self.part, self.figures(**culled), run(self.end if end is None else end), [self.figures()], run(self.end), 3.0)
+        return [c["what"] for c in checks if not c["good"]]
+
+    def test_each_bar(self):
+        self.assertEqual(self.missed(), [])
+        for culled, bar in (({"finite": False}, "stopped, or not finite"), ({"peak": 2.3}, "kinetic energy, largest (M g d)"),
+                            ({"late": 1.1}, "kinetic energy, last tenth (M g d)"), ({"fastest": 1.6}, "largest speed (m/s)"),
+                            ({"added": 1.1e-5}, "energy added, of m g d per granule restored"), ({"late": float("nan")}, "kinetic energy, last tenth (M g d)")):
+            self.assertEqual(self.missed(**culled), [bar])
+        self.assertEqual(self.missed(added=0.9e-5), [])
+
+    def test_nothing_may_be_lost(self):
+        self.assertEqual(self.missed(lost=1, end=self.end[:2]), ["granules lost"])
+        lighter = self.end.copy()
+        lighter["mass"][0] = 0.4999
+        self.assertEqual(self.missed(end=lighter), ["granules lost"])
+        self.part.lossy = True
+        self.assertEqual(self.missed(end=lighter), [])
+
+    def test_where_unculled_is_unstable_a_line_is_enough_and_a_crash_is_not(self):
+        for failure, good in ((None, True), ("live: LIGGGHTS stopped with status 1: ERROR: Lost atoms", True),
+                              ("live: LIGGGHTS was killed by signal 11 (SIGSEGV): ERROR: x", False), ("live: LIGGGHTS stopped with status 1: it printed nothing", False)):
+            check, = self.stress.of_unstable("", self.part, self.figures(failure=failure), None, None, None, 1.0)
+            self.assertEqual(check["good"], good, failure)
+
+    def test_mechanical_energy(self):
+        columns = "mass radius x y z vx vy vz omegax omegay omegaz".split()
+        r, m, depth = 0.01, 2.0, 1e-4
+        apart = dict(zip(columns, np.array([[m, r, 0.05, 0.05, r - depth, 3, 0, 4, 0, 5, 0], [m, r, 0.05, 0.05, 0.5, 0, 0, 0, 0, 0, 0]]).T))
+        modulus = 5e6 / (2 * (1 - 0.3**2))
+        due = m * 25 / 2 + 0.2 * m * r**2 * 25 + m * GRAVITY * (r - depth + 0.5) + 8 / 15 * modulus * r**0.5 * depth**2.5
+        self.assertAlmostEqual(self.stress.mechanical_energy(apart, 5e6, (0.1, 0.1)) / due, 1, delta=1e-12)
+        apart["z"] = np.array([0.5 - 2 * r + depth, 0.5])
+        due += m * GRAVITY * (0.5 - 2 * r + depth - r + depth) + 8 / 15 * modulus * ((r / 2)**0.5 - r**0.5) * depth**2.5
+        self.assertAlmostEqual(self.stress.mechanical_energy(apart, 5e6, (0.1, 0.1)) / due, 1, delta=1e-12)
+
+
 # stands before the launcher and spoils the run
 SPOILER = """\
 #!/usr/bin/python3
@@ -234,13 +308,13 @@ sys.exit(status)
 class Spoiled(Scripts):
     """What a few steps must not let pass, in a real run: one line, status 2."""
 
-    def spoiled(self, change="pass", lose=False):
+    def spoiled(self, change="pass", lose=False, suite="motion", scene="drop"):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         launcher = Path(folder.name) / "launcher"
         launcher.write_text(SPOILER.format(change=change, lose=lose, launcher=LAUNCHER))
         launcher.chmod(launcher.stat().st_mode | stat.S_IXUSR)
-        said = self.run_script(ROOT / "validation" / "motion" / "motion.py", None, "drop", launcher=str(launcher), status=2)
+        said = self.run_script(ROOT / "validation" / suite / f"{suite}.py", None, scene, launcher=str(launcher), status=2)
         self.assertEqual(said.count("\n"), 1, said)
         return said
 
@@ -254,6 +328,13 @@ class Spoiled(Scripts):
 
     def test_a_granule_that_is_lost(self):
         self.assertIn("motion: drop-flat, few steps: culled-1 ended with 255 granules of 255 ids, not 256", self.spoiled(lose=True))
+
+    def test_stress_tells_a_lost_granule(self):
+        self.assertIn("stress: sway, few steps: live ended with 149 granules of 149 ids, not 150", self.spoiled(lose=True, suite="stress", scene="sway"))
+
+    def test_stress_tells_a_deck_that_ends_early(self):
+        self.assertIn("stress: sway, few steps: live made 0 steps after the fix line, not 500",
+                      self.spoiled(r"""deck = re.sub(r"(?m)^run \$\{steps\}$", "run 0", deck)""", suite="stress", scene="sway"))
 
 
 if __name__ == "__main__":

@@ -421,6 +421,14 @@ class Progress(Folder):
         self.assertAlmostEqual(progress.seconds_left(both), (50 + 12.5 + 100 + 62.5) / 2, delta=1)
         self.assertIsNone(progress.seconds_left([both[0], self.running(culled, 50, 10)]), "too early to tell")
 
+    def test_where_all_unculled_runs_were_made_before(self):
+        _, progress = self.progress()
+        made = types.SimpleNamespace(name="unculled-1", loop_time=1.0)
+        for _ in range(2):
+            progress.skipped(made, "unculled")
+        progress.walls["culled"] = [20.0]
+        self.assertEqual(progress.seconds_left([]), 20 / 2)
+
 
 class Kept(Folder):
     def test_a_bed_is_made_again_when_its_recipe_changes(self):
@@ -490,13 +498,13 @@ class Drivers(unittest.TestCase):
 
     DRIVERS = ("examples/impact/example.py", "examples/drum/example.py", "examples/falling_mass/example.py", "examples/plate_discharge/example.py",
                "validation/motion/motion.py", "validation/scale/scale.py", "validation/scale/choices.py", "validation/scale/weight.py",
-               "validation/activity/activity.py")
+               "validation/activity/activity.py", "validation/stress/stress.py")
 
     def test_no_launcher(self):
         for driver in self.DRIVERS:
             with self.subTest(driver=driver):
                 # of few steps, so that beds of a user's own runs stay as they are
-                scene = ["tilt"] if "motion" in driver else ["gas"] if "activity" in driver else []
+                scene = ["tilt"] if "motion" in driver else ["gas"] if "activity" in driver else ["heavy"] if "stress" in driver else []
                 done = subprocess.run(["/usr/bin/python3", str(ROOT / driver), "--few-steps", *scene], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                       stderr=subprocess.PIPE, text=True, timeout=100, env={**os.environ, engine.NAMED_BY: "/nowhere/liggghts-solidcull"})
                 self.assertEqual(done.returncode, 2, done.stderr)

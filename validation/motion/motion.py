@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Beds and blocks that are tilted, shaken, let go, emptied, left alone for long, or that slide and drop, culled and unculled.
+"""Beds and blocks that are tilted, shaken, let go, emptied, or that slide and drop, culled and unculled.
 
     validation/motion/motion.py [--few-steps] [scene ...]
 
@@ -19,16 +19,15 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
-from solidcull_runs import beds, errors, few_steps, metrics, tables, twins  # noqa: E402
+from solidcull_runs import beds, errors, few_steps, tables, twins  # noqa: E402
 from solidcull_runs.dumps import read_final, snapshots  # noqa: E402
 from solidcull_runs.metrics import check  # noqa: E402
 from solidcull_runs.surfaces import centre_height, outside  # noqa: E402
 
 OUT = HERE / "out"  # out/few with --few-steps
 GRAVITY = 9.81      # m/s^2
-DIAMETER = 0.005    # m: mean, of all scenes but the matrix of `stability`
-TIME_STEP = 5e-5    # s, likewise
-DENSITY, POISSON = 2500, 0.3
+DIAMETER = 0.005    # m: mean
+TIME_STEP = 5e-5    # s
 BOX, SILO = (0.09, 0.035), (0.12, 0.03)  # m: L and W of the decks
 BLOCK = 8 * 8 * 4                        # granules of the block that slides or drops
 FEW_KEYWORDS = "depth 0.25 voxel 0.125 every 20 calm 1 speed 0.1"  # so that a small bed locks granules within few steps
@@ -106,16 +105,15 @@ def bed_figures(run, size):
 
 # --- runs and bars --------------------------------------------------------------------------------------------------
 
-def compare(part, deck, figures, variables, granules, steps_if_few, least_margins=None, runs=3, keywords=FEW_KEYWORDS,
-            locks_if_few=True):
+def compare(part, deck, figures, variables, granules, steps_if_few, least_margins=None, keywords=FEW_KEYWORDS):
     """The comparison of one deck; `figures(run)` gives its metrics. `granules`: that the deck holds; `steps_if_few`: after the fix line.
     `least_margins`: by metric, where 2 % of the mean says nothing (a mean near zero). `keywords`: more of them, with few steps."""
-    n = 1 if few else runs
+    n = 1 if few else 3
     result, done = twins.compare(HERE / deck, out=OUT / part, unculled=n, culled=n, variables=variables, extra=figures, granules=granules,
                                  least_margins=least_margins, keywords=keywords if few else None,
                                  say=lambda line: print(f"  {part}: {line}", flush=True))
     if few:
-        few_steps.check(done, granules, steps_if_few, locks_if_few, where=f"{part}, ")
+        few_steps.check(done, granules, steps_if_few, where=f"{part}, ")
     result["good"] = result["good"] and result["ledger"] is not None
     return result, done
 
@@ -130,12 +128,11 @@ def culled_run(part, deck, variables, granules, steps_if_few, k=0):
     return run
 
 
-def report(scene, parts, checks, notes=(), figures=None):
-    """Prints the scene's tables, writes its JSON (`figures`: more for it, not printed); whether all is good."""
+def report(scene, parts, checks, notes=()):
+    """Prints the scene's tables, writes its JSON; whether all is good."""
     good = all(p["good"] for p in parts.values()) and all(c["good"] for c in checks)
     tables.print_scene(parts, checks, notes)
-    (OUT / f"{scene}.json").write_text(json.dumps({"good": good, "parts": parts, "checks": checks, "notes": list(notes),
-                                                   "figures": figures or {}}, indent=1) + "\n")
+    (OUT / f"{scene}.json").write_text(json.dumps({"good": good, "parts": parts, "checks": checks, "notes": list(notes)}, indent=1) + "\n")
     return good
 
 
@@ -232,106 +229,6 @@ def outlet():
     return report("outlet", {"outlet": result}, [])
 
 
-def rayleigh_time(radius, young):
-    """Rayleigh time of a granule (s)."""
-    shear = young / (2 * (1 + POISSON))
-    return math.pi * radius * math.sqrt(DENSITY / shear) / (0.1631 * POISSON + 0.8766)
-
-
-def drift(run, start):
-    """Largest displacement of a granule since the start dump, in mean diameters."""
-    a, b = read_final(start), run.final
-    moved = np.sqrt(sum((a[c] - b[c])**2 for c in "xyz"))
-    return float(moved.max() / (2 * a["radius"].mean()))
-
-
-def long_rest(checks, notes):
-    """A million steps of a bed at rest: energy and places."""
-    # rolling friction (epsd2) is a spring without damping: a loose granule swings for seconds
-    bed = settled("column", name="box", L=0.03, W=0.03, **{"granules": 500, "top": 0.5, "free": 3, "stills": 8, **shortened(**SHORT_POUR)})
-
-    def figures(run):
-        energy = kinetic_energy(run)[1][1:]
-        tenth = max(1, len(energy) // 10)
-        return {"first tenth": float(energy[:tenth].max()), "last tenth": float(energy[-tenth:].max()), "largest": float(energy.max()),
-                "drift (d)": drift(run, HERE / start_dump("rest"))}
-
-    result, runs = compare("rest", "rest.in", figures, {"restart": bed, "L": 0.03, "W": 0.03, "start_dump": start_dump("rest"),
-                                                        **shortened(steps=500, rows=50, before=50)}, granules_of(500), 500, runs=1)
-    u, c = runs["unculled"][0].metrics, runs["culled"][0].metrics
-    weight = float(runs["unculled"][0].final["mass"].sum()) * GRAVITY
-    still = weight * DIAMETER * 1e-9  # J: a bed that rests has less
-    checks += [check("rest: kinetic energy, largest (J), of 1e-9 M g d", c["largest"], max(still, u["largest"])),
-               check("rest: kinetic energy in the last tenth (J), of the first's", c["last tenth"],
-                     max(c["first tenth"], u["last tenth"], 1e-4 * still)),
-               check("rest: drift (d)", c["drift (d)"], max(1e-6, u["drift (d)"]))]
-    checks.append(check("rest: granules lost", metrics.is_lost(result["ledger"]), 0))
-    notes.append(f"rest: unculled {u}\nrest: culled   {c}\nrest: loop {result['unculled']['loop_time']:.0f} s, culled {result['culled']['loop_time']:.0f} s")
-    return {"unculled": u, "culled": c}
-
-
-SMALL, LARGE = 0.0005, 0.0025  # m: the radii of the matrix, ratio 5
-STIFF, SOFT = 1e9, 5e6         # Pa
-
-
-def matrix(checks, notes):
-    """Stiff and soft beds of two sizes at rest, three time steps each: where unculled is stable, culled is."""
-    rows = {}
-    for young in (SOFT, STIFF):
-        whole = rayleigh_time(SMALL, young)
-        bed = settled(f"ratio5-{young:g}", name="box", L=0.012, W=0.012, granules=450, small=SMALL, large=LARGE, share=0.25, E=young,
-                      top=0.06, dt=0.22 * whole, **(dict(pour=0.15, damp=0.15, free=0.05, stills=6) if not few else
-                                                    dict(pour=0.12, damp=0.05, free=0.002) if young == SOFT else
-                                                    dict(pour=0.003, damp=0.001, free=0.0005)))
-        for share in (0.05, 0.15, 0.25):
-            part = f"matrix-{young:g}-{100 * share:g}"
-
-            def figures(run):
-                energy = kinetic_energy(run)[1][1:]
-                return {"largest": float(energy.max()), "end": float(energy[-1]), "drift (d)": drift(run, HERE / start_dump(part))}
-
-            result, runs = compare(part, "rest.in", figures, {
-                "restart": bed, "L": 0.012, "W": 0.012, "E": young, "dt": share * whole, "skin": 0.00015, "start_dump": start_dump(part),
-                "before": 100, "rows": 20, "steps": 300 if few else 20000}, 450, 300, runs=1,
-                locks_if_few=young == SOFT)  # the stiff bed, its steps short, still falls
-            final = runs["unculled"][0].final
-            limit = float(final["mass"].sum()) * GRAVITY * 2 * SMALL * 1e-3  # J: what is unstable passes it
-            u, c = runs["unculled"][0].metrics, runs["culled"][0].metrics
-            rows[part] = {"unculled": u, "culled": c, "limit": limit}
-            stable = u["largest"] < limit
-            notes.append(f"{part}: largest kinetic energy (J) unculled {u['largest']:.3g}, culled {c['largest']:.3g}; "
-                         f"drift (d) {u['drift (d)']:.3g}, {c['drift (d)']:.3g}")
-            checks.append(check(f"{part}: culled kinetic energy (J), unculled {'stable' if stable else 'UNSTABLE'}", c["largest"], limit,
-                                (c["largest"] < limit or not stable) and not metrics.is_lost(result["ledger"])))
-    return rows
-
-
-SUPPORTS = 10
-
-
-def heavy(checks, notes):
-    """A body of 10^6 granules' mass on ten granules: no growth of energy. Unculled, the block is no body: nothing to compare with."""
-    run = culled_run("heavy", "heavy.in", shortened(steps=500), 9 * 5 * 5 + SUPPORTS, 500)
-    energy = kinetic_energy(run)[1][1:]
-    z = centre(run, "v_z", "f_cull[22]")[1]
-    half = len(energy) // 2
-    figures = {"first half": float(energy[:half].max()), "second half": float(energy[half:].max()), "lowest": float(z.min()),
-               "highest": float(z.max()), "supports, largest": float(run.series("c_supports")[1][1:].max())}
-    checks += [check("heavy: kinetic energy in the second half (J), of the first's", figures["second half"], 1.02 * figures["first half"]),
-               check("heavy: the block sinks or rises (d)", (z.max() - z.min()) / DIAMETER, 0.02),
-               check("heavy: exterior granules, most once locked", run.series("f_cull[1]")[1][2:].max(), SUPPORTS),
-               check("heavy: granules restored before the end", run.series("f_cull[7]")[1].max(), 0)]
-    notes.append(f"heavy: {figures}")
-    return figures
-
-
-def stability():
-    """Long rest, the matrix of stiffness and time step, the heavy block."""
-    checks, notes = [], []
-    figures = {"rest": long_rest(checks, notes), "matrix": matrix(checks, notes), "heavy": heavy(checks, notes)}
-    return report("stability", {}, checks, notes, figures)
-
-
 FRICTION = 0.4
 
 
@@ -378,7 +275,7 @@ def drop():
     return report("drop", parts, [])
 
 
-SCENES = {f.__name__: f for f in (tilt, shake, switch, outlet, stability, slide, drop)}
+SCENES = {f.__name__: f for f in (tilt, shake, switch, outlet, slide, drop)}
 
 
 def main(argv=None):

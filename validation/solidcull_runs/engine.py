@@ -68,6 +68,8 @@ class Process:
         command = [launcher, "-in", str(deck), *(["-log", str(log), "-echo", "log"] if screen else ["-log", "none", "-echo", "screen"])]
         for name, value in (variables or {}).items():
             command += ["-var", name, str(value)]
+        if ranks == 1 and shutil.which("stdbuf"):  # LIGGGHTS aborts without emptying its buffers: the line that says why would be lost
+            command = ["stdbuf", "-oL", *command]
         if ranks > 1:
             command = ["mpirun", "--oversubscribe", "-np", str(ranks), *command]
         self.wall = self.cpu = None  # s: from start to end, and of processors, once it has ended

@@ -162,7 +162,7 @@ class Progress:
             return None
         each.setdefault("files", each.get("culled", 0.0))
         begun = {kind: len(walls) + sum(job.kind == kind for job, _ in running) for kind, walls in self.walls.items()}
-        waiting = sum(each[kind] * (self.kinds.count(kind) - n) for kind, n in begun.items())
+        waiting = sum(each[kind] * (self.kinds.count(kind) - n) for kind, n in begun.items() if kind in each)  # else all were made before
         return max([*going, (sum(going) + waiting) / self.at_once])
 
 
