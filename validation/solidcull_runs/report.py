@@ -119,8 +119,8 @@ FIRST = ["case", "granules", "N/N_moving", "`sleep`: times faster", "largest err
 def first_page(page, results, folder, how):
     page.heading(1, "solidcull: run time against error")
     page.text(how)
-    page.text("Each case is run unculled at least five times, its tool, ball or wall 10 µm farther each time, and culled from the same "
-              "restart file. An error is what a culled run differs from the unculled one that starts alike, mean of all pairs. It is given in margins, "
+    page.text("Each case is run unculled at least five times. Its tool, ball or wall starts 10 µm farther each time. Culled runs start from the "
+              "same restart file. An error is what a culled run differs from the unculled one that starts alike, mean of all pairs. It is given in margins, "
               "which each case's README has fixed before. The verdict is that of two one-sided tests at 5 %: `equivalent`, "
               "`outside`, or `not decided` where the runs scatter too much to tell. Time is that of a core in LIGGGHTS's loop.")
     page.table(FIRST, [first_row(r) for r in results])
