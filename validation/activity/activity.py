@@ -3,7 +3,7 @@
 
     validation/activity/activity.py [scene ...] [--runs N] [--fix KEYWORDS] [--check] [--few-steps]
 
-Makes the beds once (out/*.restart), runs each scene's deck N times unculled (granules 1e-5 d apart, tools 10 um: the noise floor)
+Makes the beds once (out/*.restart), runs each scene's deck N times unculled (granules 1e-5 d apart: the noise floor)
 and N times culled, in turns, prints a table per scene and leaves all figures in out/SCENE.json. A culled figure is good within the larger of 2 % and
 the noise floor of the unculled mean; a check has the bar beside it. Exit: 0 nothing lost, 1 a granule lost, 2 a run failed;
 with --strict 1 also when a figure is outside its margin. `--few-steps`: every deck for a few steps; what can be checked then is
@@ -33,8 +33,8 @@ OUT = HERE / "out"                               # meshes and beds
 DIAMETER = 0.00275                               # m: mean, of the beds that wake
 TRAY, HALL = (0.15, 0.06), (0.06, 0.06)          # m: L and W of the beds that wake
 CELL = 0.0005                                    # m, of the height map
-ASIDE = [k * 1e-5 for k in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5)]  # m: the place of a tool in each run
 HARM = 1.02                                      # loop time culled over unculled that is allowed where nothing rests
+MOST_RUNS = 10
 FELL = 0.5                                       # mean diameters: what has sunk by more has fallen
 
 options = argparse.Namespace(runs=3, fix=None, few_steps=False)
@@ -57,8 +57,6 @@ def make_meshes():
         meshes.write_stl(OUT / f"{name}.stl", triangles)
 
     write("tray", floor(TRAY, 30, 12))
-    write("blade", grid((0.03, 0.02, 0), (0, 0.02, 0), (0, 0, 0.02), 4, 4))
-    write("block", meshes.block((0.06, 0.015, 0), (0.09, 0.045, 0.01)))
     (l, w), low, tall = HALL, -0.0205, 0.1005
     write("hall-floor", floor(HALL, 12, 12))
     write("hall-sides", [t for corner, u in (((0, 0), (l, 0)), ((0, w), (l, 0)), ((0, 0), (0, w)), ((l, 0), (0, w)))
@@ -147,12 +145,12 @@ def map_check(runs, start, size):
 
 # --- runs -----------------------------------------------------------------------------------------------------------
 
-def compare(part, deck, figures, variables, granules, steps_if_few, vary=None, locks=True, poured=0):
-    """The comparison of one deck; `figures(run)` gives its metrics. `vary`: a variable and its value in each run. `granules`: at the
-    end, of which `poured` are added on the way; `steps_if_few`: after the fix line; `locks`: whether few of them lock granules."""
+def compare(part, deck, figures, variables, granules, steps_if_few, locks=True, poured=0):
+    """The comparison of one deck; `figures(run)` gives its metrics. `granules`: at the end, of which `poured` are added on
+    the way; `steps_if_few`: after the fix line; `locks`: whether few of them lock granules."""
     given = {**variables, **({"keywords": options.fix} if options.fix else {})}
     result, runs = twins.compare(HERE / deck, out=results() / part, unculled=options.runs, culled=options.runs, variables=given, extra=figures,
-                                 vary=vary, granules=granules, say=lambda line: print(f"  {part}: {line}", flush=True))
+                                 granules=granules, say=lambda line: print(f"  {part}: {line}", flush=True))
     if options.few_steps:
         few_steps.check(runs, granules, steps_if_few, locks, poured, where=f"{part}, ")
     return result, runs
@@ -177,27 +175,6 @@ def in_tray(scene, figures, granules, steps_if_few, few, **how):
     result, runs = compare(scene, f"{scene}.in", lambda run: {**figures(run), **bed_figures(run, TRAY)},
                            {"restart": tray_bed(), "start_dump": start.relative_to(HERE), **short(**few)}, granules, steps_if_few, **how)
     return report(scene, {scene: result}, map_check(runs, start, TRAY))
-
-
-def blade():
-    """A blade dips into a sleeping bed and ploughs through it."""
-    def figures(run):
-        x, z = rows_of(run, 2, "f_force[1]"), rows_of(run, 2, "f_force[2]")
-        return {"drag, mean (N)": float(-x.mean()), "drag, largest (N)": float((-x).max()), "lift, mean (N)": float(z.mean()),
-                "lift while dipping, largest (N)": float(rows_of(run, 1, "f_force[2]").max())}
-
-    return in_tray("blade", figures, either(FEW, 12000), 900, {"before": 100, "dip": 0.001, "path": 0.0005}, vary=("aside", ASIDE))
-
-
-def lower():
-    """A block is lowered into a sleeping bed by 8 mm, held, and withdrawn."""
-    def figures(run):
-        hold = rows_of(run, 2, "f_force[2]")
-        return {"force, largest (N)": float(rows_of(run, 1, "f_force[2]").max()),
-                "force on hold, second half (N)": float(hold[len(hold) // 2:].mean())}
-
-    return in_tray("lower", figures, either(FEW, 12000), 1300, {"before": 100, "depth": 0.0005, "hold": 200, "after": 200},
-                   vary=("aside", ASIDE))
 
 
 def pour():
@@ -283,7 +260,7 @@ def silo():
     return no_harm("silo", filled("silo"), either(150, 6000))
 
 
-SCENES = {f.__name__: f for f in (blade, pour, lower, weight, drum, mixer, gas, silo)}
+SCENES = {f.__name__: f for f in (pour, weight, drum, mixer, gas, silo)}
 
 
 def main(argv=None):
@@ -296,8 +273,8 @@ def main(argv=None):
     p.add_argument("--strict", action="store_true", help="a figure outside its margin counts")
     p.add_argument("--few-steps", action="store_true", help="every deck for a few steps, one run of each")
     options = p.parse_args(argv)
-    if not 1 <= options.runs <= len(ASIDE):
-        p.error(f"--runs takes 1 to {len(ASIDE)}")
+    if not 1 <= options.runs <= MOST_RUNS:
+        p.error(f"--runs takes 1 to {MOST_RUNS}")
     if options.few_steps:
         options.runs = 1
     if options.check:

@@ -8,7 +8,7 @@ case.py holds, as plain names:
 | `quick`, `full` | variables of the deck (and of the bed), by size; `granules` is how many there are at the end |
 | `bed` | optional: the deck that settles the bed and writes ${restart}; another folder's may be named |
 | `bed_uses` | optional: the variables of the bed, all of the size if not said |
-| `scenes` | optional: name -> more variables. The first is swept over all points, the others are run at the defaults only |
+| `scenes` | optional: name -> more variables. The first is swept over all points, the others are run at the defaults only. Or: size -> such scenes |
 | `files(folder, v)` | optional: writes meshes and the like for the variables v; the deck finds the folder as ${files} |
 | `aside` | the variable that moves the tool, ball or wall by 10 um from run to run |
 | `by_hand` | optional: a region (style and arguments; the deck's variables) in which granules stay free when the rest is frozen by hand |
@@ -93,7 +93,8 @@ class Case:
         self.reference = paragraph(readme, "Reference", self.folder / "README.md")
         self.metrics = metrics_of(readme, self.folder / "README.md")
         self.given = self.read()
-        self.scenes = self.get("scenes", {"": {}})
+        scenes = self.get("scenes", {"": {}})
+        self.scenes = scenes.get(size, scenes)
         self.deck = self.folder / self.need("deck")
         self.sized = dict(self.need(size))
         self.need("measure")
