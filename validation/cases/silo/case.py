@@ -3,7 +3,7 @@ import math
 
 import numpy as np
 
-from solidcull_runs import meshes
+from solidcull_runs import meshes, moving
 
 deck, bed = "discharge.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "low", "high", "pour")
@@ -26,12 +26,12 @@ def files(folder, v):
 
 
 def measure(run, v):
-    (_, t), (_, out), (_, floor), (_, right) = (run.series(c) for c in ("time", "v_out", "v_floor", "v_right"))
+    t, out, floor, right, whole = moving.series(run, "time", "v_out", "v_floor", "v_right", "v_whole")
     resting = t <= t[0] + v["rest"] * v["dt"]
     late = t >= t[resting][-1] + (t[-1] - t[resting][-1]) / 3
     way = np.sqrt(sum((run.final[c] - run.start[c])**2 for c in "xyz"))
     weight = 9.81 * run.start["mass"].sum()
-    return {"floor's load at rest": run.series("v_whole")[1][resting].mean() / weight, "right wall's load at rest": right[resting].mean(),
+    return {"floor's load at rest": whole[resting].mean() / weight, "right wall's load at rest": right[resting].mean(),
             "mass flow": np.polyfit(t[late], out[late], 1)[0], "floor's load, emptying": floor[late].mean(),
             "right wall's load, emptying": right[late].mean(), "what stays": run.final["mass"][way < D / 2].sum() / run.final["mass"].sum()}
 

@@ -1,7 +1,7 @@
 """A door in the floor sinks a little, then opens."""
 import numpy as np
 
-from solidcull_runs import meshes, surfaces
+from solidcull_runs import meshes, moving, surfaces
 
 deck, bed = "door.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "low", "high", "pour")
@@ -35,12 +35,12 @@ def slope(granules, v, side):
 
 
 def measure(run, v):
-    t, door = run.series("time")[1], run.series("v_door")[1]
+    t, door, out = moving.series(run, "time", "v_door", "v_out")
     t = t - t[0]
     end_of_rest, end_of_hold = v["rest"] * v["dt"], (v["rest"] + v["sinking"] + v["hold"]) * v["dt"]
     held = (t <= end_of_hold) & (t >= end_of_hold - v["hold"] / 2 * v["dt"])
     return {"door's load at rest": door[t <= end_of_rest].mean(), "door's least load": door[t <= end_of_hold].min(), "door's load, sunk": door[held].mean() if held.any() else np.nan,
-            "discharged": run.series("v_out")[1][-1], "angle left": slope(run.final, v, -1), "angle right": slope(run.final, v, 1)}
+            "discharged": out[-1], "angle left": slope(run.final, v, -1), "angle right": slope(run.final, v, 1)}
 
 
 def laws(values):
