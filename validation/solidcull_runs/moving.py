@@ -8,6 +8,12 @@ def series(run, *names):
     return found[0] if len(found) == 1 else found
 
 
+def time(run):
+    """Time since the fix line (s), without the first row too."""
+    t = run.series("time")[1]
+    return t[1:] - t[0]
+
+
 def kinetic_energy(run):
     """Of all granules (J), of the columns c_ke and f_cull[19]."""
     return series(run, "c_ke") + (series(run, "f_cull[19]") if run.counts else 0)

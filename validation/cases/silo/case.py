@@ -26,8 +26,9 @@ def files(folder, v):
 
 
 def measure(run, v):
-    t, out, floor, right, whole = moving.series(run, "time", "v_out", "v_floor", "v_right", "v_whole")
-    resting = t <= t[0] + v["rest"] * v["dt"]
+    t = moving.time(run)
+    out, floor, right, whole = moving.series(run, "v_out", "v_floor", "v_right", "v_whole")
+    resting = t < (v["rest"] + 0.5) * v["dt"]
     late = t >= t[resting][-1] + (t[-1] - t[resting][-1]) / 3
     way = np.sqrt(sum((run.final[c] - run.start[c])**2 for c in "xyz"))
     weight = 9.81 * run.start["mass"].sum()

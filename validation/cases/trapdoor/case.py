@@ -35,9 +35,9 @@ def slope(granules, v, side):
 
 
 def measure(run, v):
-    t, door, out = moving.series(run, "time", "v_door", "v_out")
-    t = t - t[0]
-    end_of_rest, end_of_hold = v["rest"] * v["dt"], (v["rest"] + v["sinking"] + v["hold"]) * v["dt"]
+    t = moving.time(run)
+    door, out = moving.series(run, "v_door", "v_out")
+    end_of_rest, end_of_hold = (v["rest"] + 0.5) * v["dt"], (v["rest"] + v["sinking"] + v["hold"] + 0.5) * v["dt"]
     held = (t <= end_of_hold) & (t >= end_of_hold - v["hold"] / 2 * v["dt"])
     return {"door's load at rest": door[t <= end_of_rest].mean(), "door's least load": door[t <= end_of_hold].min(), "door's load, sunk": door[held].mean() if held.any() else np.nan,
             "discharged": out[-1], "angle left": slope(run.final, v, -1), "angle right": slope(run.final, v, 1)}
