@@ -21,5 +21,6 @@ def files(folder, v):
 
 def measure(run, v):
     t, depth, fall, force, floor = (run.series(c)[1] for c in ("time", "v_depth", "c_fall", "v_force", "v_floor"))
-    return {"depth": depth.max(), "time to half the speed": t[np.argmax(fall > fall[0] / 2)] - t[0], "depth at the end": depth[-1],
+    slower = np.argmax(fall > fall[0] / 2) + 1
+    return {"depth": depth.max(), "time to half the speed": np.interp(fall[0] / 2, fall[:slower], t[:slower]) - t[0], "depth at the end": depth[-1],
             "peak force on the ball": force.max(), "peak rise of the floor's load": floor.max() - floor[0]}
