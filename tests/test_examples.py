@@ -137,24 +137,15 @@ class Examples(Scripts):
 class Validation(Scripts):
     def test_motion(self):
         out = ROOT / "validation" / "motion" / "out" / "few"
-        self.run_script(ROOT / "validation" / "motion" / "motion.py", out / "tilt.json")
-        scenes = {"tilt": 150, "shake": 150, "switch": 150, "outlet": 150, "drop": 256}
-        for scene, granules in scenes.items():
-            parts = json.loads((out / f"{scene}.json").read_text())["parts"]
-            self.assertEqual(len(parts), {"shake": 2, "drop": 2}.get(scene, 1))
-            for name, part in parts.items():
-                with self.subTest(part=name):
-                    self.nothing_lost(part, granules)
-                    if scene == "drop":  # in the air: after 400 steps of 3 us it falls as anything does
-                        for kind in ("unculled", "culled"):
-                            self.assertAlmostEqual(part["metrics"]["rebound (m/s)"][kind][0], -GRAVITY * 400 * 3e-6, delta=1e-8)
-                        self.close(part, 1e-9, "radius of gyration, end (m)")
-                    else:
-                        self.assertEqual(part["metrics"]["granules outside"]["culled"], [0])
-                    if scene in ("tilt", "shake", "switch"):
-                        self.close(part, 0.01, "bed height (m)", "centre of mass (m)")
-                    if scene == "shake":
-                        self.close(part, 0.02, "floor load, largest (N)", "floor load, mean (N)")
+        self.run_script(ROOT / "validation" / "motion" / "motion.py", out / "drop.json")
+        parts = json.loads((out / "drop.json").read_text())["parts"]
+        self.assertEqual(len(parts), 2)
+        for name, part in parts.items():
+            with self.subTest(part=name):
+                self.nothing_lost(part, 256)
+                for kind in ("unculled", "culled"):  # in the air: after 400 steps of 3 us it falls as anything does
+                    self.assertAlmostEqual(part["metrics"]["rebound (m/s)"][kind][0], -GRAVITY * 400 * 3e-6, delta=1e-8)
+                self.close(part, 1e-9, "radius of gyration, end (m)")
 
     def test_stress(self):
         out = ROOT / "validation" / "stress" / "out" / "few"
@@ -215,7 +206,7 @@ class Validation(Scripts):
         few = ROOT / "validation" / "activity" / "out" / "few"
         # asleep, so that the small beds, a few granules high, are culled at all
         self.run_script(few.parents[1] / "activity.py", few / "silo.json", "--check", "--fix", "exterior sleep")
-        granules = {"pour": 1100, "weight": 1000, "drum": 300, "mixer": 150, "gas": 200, "silo": 150}
+        granules = {"pour": 1100, "weight": 1000, "silo": 150}
         for scene, count in granules.items():
             with self.subTest(scene=scene):
                 report = json.loads((few / f"{scene}.json").read_text())

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Scenes that wake a sleeping bed, and scenes where culling cannot pay, culled and unculled.
+"""Scenes that wake a sleeping bed, and one where culling cannot pay, culled and unculled.
 
     validation/activity/activity.py [scene ...] [--runs N] [--fix KEYWORDS] [--check] [--few-steps]
 
@@ -20,10 +20,9 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
 MOTION = HERE.parent / "motion"
 sys.path.insert(0, str(HERE.parent))
-from solidcull_runs import beds, errors, examples, few_steps, meshes, metrics, tables, twins  # noqa: E402
+from solidcull_runs import beds, errors, few_steps, meshes, metrics, tables, twins  # noqa: E402
 from solidcull_runs.dumps import element_forces, read_final  # noqa: E402
 from solidcull_runs.meshes import grid  # noqa: E402
 from solidcull_runs.metrics import check  # noqa: E402
@@ -65,9 +64,6 @@ def make_meshes():
     write("hopper", [t for bottom, top in ((0.03, 0.0), (0.09, 0.12))
                    for t in grid((bottom, -0.0009, 0), (0, 0.0318, 0), (top - bottom, 0, 0.17), 1, 1)])
     write("plug", grid((0.029, -0.0009, 0), (0.062, 0, 0), (0, 0.0318, 0), 1, 1))
-    angles = np.radians([0, 90, 180, 270])
-    write("mixer", [t for a in angles for t in grid((0, 0, 0.004), (0.046 * np.cos(a), 0.046 * np.sin(a), 0), (0, 0, 0.03), 2, 2)])
-    examples.load("drum").write_drum(OUT)
 
 
 # --- beds -----------------------------------------------------------------------------------------------------------
@@ -107,15 +103,9 @@ def hall_bed():
 
 
 def filled(room, **variables):
-    """A bed of a scene in which nothing rests, poured by fill.in."""
+    """A bed in which nothing rests, poured by fill.in."""
     sources = [HERE / f for f in ("flow.in", f"{room}_room.in", f"{room}_walls.in")] + [MOTION / "material.in"]
     return made(room, HERE, "fill.in", sources, **{"room": room, **variables, **short(granules=150, pour=400, calm=0)})
-
-
-def drum_bed():
-    drum = ROOT / "examples" / "drum"
-    return made("drum", drum, "fill.in", [drum / "material.in"], drum=str(OUT / "drum.stl"), period=1,
-                **{"poursteps": 8000, "turnsteps": 8000, **short(granules=300, poursteps=300, turnsteps=300)})
 
 
 # --- figures of a run -----------------------------------------------------------------------------------------------
@@ -218,7 +208,7 @@ def weight():
     return report("weight", parts, checks, notes)
 
 
-# --- scenes in which nothing rests ----------------------------------------------------------------------------------
+# --- a scene in which nothing rests ----------------------------------------------------------------------------------
 
 def no_harm(scene, restart, whole, **variables):
     """A scene in which culling cannot pay: loop time with the fix over without it, runs in turns."""
@@ -239,28 +229,12 @@ def no_harm(scene, restart, whole, **variables):
     return report(scene, {scene: result}, [check("loop time culled / unculled, medians", ratio, HARM)], notes)
 
 
-def drum():
-    """A drum that turns once a second: the whole bed tumbles."""
-    return no_harm("drum", drum_bed(), either(300, 8600), period=1)
-
-
-def mixer():
-    """A mixer of four blades, four turns a second, in a bed."""
-    fine = {"dt": 3e-5}
-    return no_harm("mixer", filled("mixer", small=0.0018, large=0.0022, calm=0, **fine), either(150, 6000), **fine)
-
-
-def gas():
-    """A loose gas in a box, without gravity; long enough for a clock to tell 2 %."""
-    return no_harm("gas", None, either(200, 5000), steps=40000, **short(granules=200))
-
-
 def silo():
     """A steep hopper that empties in mass flow."""
     return no_harm("silo", filled("silo"), either(150, 6000))
 
 
-SCENES = {f.__name__: f for f in (pour, weight, drum, mixer, gas, silo)}
+SCENES = {f.__name__: f for f in (pour, weight, silo)}
 
 
 def main(argv=None):

@@ -111,7 +111,8 @@ def make_beds(cases, out, at_once, say):
             file = bed and out / "beds" / f"{bed[0].parent.name}-{bed[0].stem}-{short_hash(bed[1])}.restart"
             files[case.name, scene] = file
             if bed:
-                wanted[file] = bed[0], {**bed[1], **files_of(case, scene, out)}
+                # a bed of shared/ may serve several cases: were it given one's files, it would be made anew for each
+                wanted[file] = bed[0], {**bed[1], **({} if bed[0].parent.name == "shared" else files_of(case, scene, out))}
 
     def make(file, deck, variables):
         sources = sorted({*deck.parent.glob("*.in"), *(deck.parent.parent.parent / "shared").glob("*.in")} - {deck})
