@@ -93,6 +93,7 @@ class Culling {
   void open_for_insertion();
   void check_inserted();
   void close_shell(bool changes, bool& shell_changed);
+  void refill(bool& shell_changed);
   void store_and_fetch(const MembershipChange& c, bool changes, bool& shell_changed);
   void count_restored();
   void publish(const MembershipChange& c);

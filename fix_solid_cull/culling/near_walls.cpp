@@ -1,0 +1,32 @@
+#include "near_walls.h"
+
+#include <algorithm>
+
+#include "sphere_cells.h"
+
+namespace solidcull {
+
+NearWalls::NearWalls(const Walls& walls, const std::vector<Sphere>& spheres, double reach)
+    : walls_(walls), triangles_(walls.triangles()), around_(spheres.size()) {
+  if (spheres.empty()) return;
+  SphereCells cells;
+  double edge = reach;
+  for (const Sphere& s : spheres) edge = std::max(edge, 2 * s.radius);
+  cells.build(spheres, edge);
+  const Vec3 around = Vec3::Constant(cells.largest_radius() + reach);
+  for (std::size_t t = 0; t < triangles_.size(); ++t)
+    cells.for_each_in_box(triangles_[t].box.lo - around, triangles_[t].box.hi + around, [&](std::size_t k, const Sphere& s) {
+      if (walls_.near(triangles_[t], s, reach)) around_[k].triangles.push_back(t);
+      return true;
+    });
+  for (std::size_t k = 0; k < spheres.size(); ++k) around_[k].primitive = walls_.primitive_near(spheres[k], reach);
+}
+
+bool NearWalls::near(std::size_t k, const Sphere& there, double gap) const {
+  const Around& around = around_[k];
+  return std::any_of(around.triangles.begin(), around.triangles.end(),
+                     [&](std::size_t t) { return walls_.near(triangles_[t], there, gap); }) ||
+         (around.primitive && walls_.primitive_near(there, gap));
+}
+
+}  // namespace solidcull
