@@ -29,4 +29,12 @@ bool NearWalls::near(std::size_t k, const Sphere& there, double gap) const {
          (around.primitive && walls_.primitive_near(there, gap));
 }
 
+bool NearWalls::between(std::size_t k, const Sphere& from, const Vec3& to) const {
+  const Vec3 way = to - from.centre;
+  const int steps = 1 + static_cast<int>(way.norm() / (0.5 * from.radius));
+  for (int n = 1; n < steps; ++n)
+    if (near(k, {from.centre + static_cast<double>(n) / steps * way, from.radius}, 0)) return true;
+  return false;
+}
+
 }  // namespace solidcull

@@ -14,6 +14,8 @@ class NearWalls {
   NearWalls(const Walls& walls, const std::vector<Sphere>& spheres, double reach);
   /// Whether sphere k, at this place, is closer than `gap` to a wall.
   bool near(std::size_t k, const Sphere& there, double gap) const;
+  /// Whether it overlaps a wall anywhere on the straight way to this place; with both ends clear, whether a wall lies between.
+  bool between(std::size_t k, const Sphere& from, const Vec3& to) const;
 
  private:
   struct Around {

@@ -14,7 +14,10 @@ constexpr int sweeps_alone = 400;
 // ranks show each other what they have packed so many times
 constexpr int rounds_beside_others = 6, sweeps_in_a_round = 80;
 constexpr double overlap_allowed = 1e-4;  // of the radii's sum
-constexpr double longest_way = 1.5;       // diameters
+// what overlaps by more after that is caught between others: it looks for room elsewhere, so many times at most
+constexpr double caught = 0.02;  // of the radii's sum
+constexpr int new_beginnings = 10, sweeps_again = 100;
+constexpr double longest_way = 4, next_place = 3;  // diameters
 
 }  // namespace
 
@@ -37,54 +40,66 @@ void Refill::pack(int sweeps) {
     Triple at;
     double radius;
     int rank;
-    bool newcomer;
+    bool moves;
   };
-  std::vector<char> is_new(static_cast<std::size_t>(atoms.owned), 0);
+  std::vector<char> moves(static_cast<std::size_t>(atoms.owned), 0);
   std::vector<int> movable;
-  std::vector<Sphere> free;
+  SphereRelaxation::Spheres spheres;
   Vec3 lo = Vec3::Constant(HUGE_VAL), hi = Vec3::Constant(-HUGE_VAL);
   for (const std::int64_t tag : newcomers_) {
     const int* i = index_.find(tag);
     if (!i || shell_[*i].body <= 0) continue;  // it went to the store again, or has left its body
-    is_new[static_cast<std::size_t>(*i)] = 1;
+    moves[static_cast<std::size_t>(*i)] = 1;
     movable.push_back(*i);
-    free.push_back(atoms.sphere(*i));
-    lo = lo.cwiseMin(free.back().centre);
-    hi = hi.cwiseMax(free.back().centre);
+    spheres.free.push_back(atoms.sphere(*i));
+    lo = lo.cwiseMin(atoms.place(*i));
+    hi = hi.cwiseMax(atoms.place(*i));
   }
   const double way = longest_way * scales_.diameter(), reach = contact_reach(ports_, solid_) + way;
-  std::vector<Sphere> fixed;
-  const auto stands_near = [&](const Sphere& s) {
-    if ((s.centre.array() > lo.array() - reach).all() && (s.centre.array() < hi.array() + reach).all()) fixed.push_back(s);
+  const auto is_near = [&](const Vec3& x) {
+    return (x.array() > lo.array() - reach).all() && (x.array() < hi.array() + reach).all();
   };
   std::vector<Row> rows;
   for (int i = 0; i < atoms.owned; ++i) {
-    const bool newcomer = is_new[static_cast<std::size_t>(i)];
-    if (!newcomer) stands_near(atoms.sphere(i));
-    rows.push_back({triple(atoms.place(i)), atoms.radius[i], ports_.ranks.me, newcomer});
+    char& mine = moves[static_cast<std::size_t>(i)];
+    if (!mine && is_near(atoms.place(i))) {
+      mine = !shell_[i].locked && shell_[i].body > 0;  // freed in this change, and of its body still
+      (mine ? spheres.stiff : spheres.fixed).push_back(atoms.sphere(i));
+      if (mine) movable.push_back(i);
+    }
+    rows.push_back({triple(atoms.place(i)), atoms.radius[i], ports_.ranks.me, mine != 0});
   }
   if (ports_.ranks.has_neighbours())
     for (const Row& r : ports_.ranks.exchange(rows, reach))
-      if (!r.newcomer || r.rank != ports_.ranks.me) stands_near({vec(r.at), r.radius});  // its own see each other across a side
-  if (free.empty()) return;
-  std::vector<Sphere> soft;
+      if ((!r.moves || r.rank != ports_.ranks.me) && is_near(vec(r.at)))  // its own see each other across a side
+        spheres.fixed.push_back({vec(r.at), r.radius});
+  if (spheres.free.empty()) return;
   std::set<std::int64_t> seen;
-  for (const Sphere& s : free)
+  for (const Sphere& s : spheres.free)
     stored_.for_each_near(s, scales_.diameter(), [&](const Resident& g) {
-      if (seen.insert(g.tag).second) soft.push_back({solid_.nearest_image(solid_.in_world(g), s.centre), g.radius});
+      if (seen.insert(g.tag).second) spheres.soft.push_back({solid_.nearest_image(solid_.in_world(g), s.centre), g.radius});
     });
   Vec3 periods = ports_.run.edges();
   for (int d = 0; d < 3; ++d)
     if (!ports_.run.periodic[d]) periods[d] = 0;
-  const NearWalls walls(ports_.walls, free, way);
-  const std::vector<Sphere> before = free;
-  SphereRelaxation relaxation(std::move(free), std::move(fixed), std::move(soft), periods);
+  SphereRelaxation relaxation(std::move(spheres), periods);
+  const std::vector<Sphere> before = relaxation.spheres();
+  const NearWalls walls(ports_.walls, before, way);
   relaxation.keep_to([&](std::size_t k, const Vec3& place) {
     return (place - before[k].centre).squaredNorm() < way * way && ports_.run.keeps(place) &&
            !walls.near(k, {place, before[k].radius}, 0);
   });
-  largest_overlap_ = std::max(largest_overlap_, relaxation.relax(sweeps, overlap_allowed));
-  place(movable, relaxation.spheres());
+  double least = relaxation.relax(sweeps, overlap_allowed);
+  std::vector<Sphere> best = relaxation.spheres();
+  for (int n = 0; n < new_beginnings && least > caught; ++n) {
+    if (relaxation.reseat(caught, next_place * scales_.diameter()) == 0) break;
+    const double overlap = relaxation.relax(sweeps_again, overlap_allowed);
+    if (overlap >= least) continue;
+    least = overlap;
+    best = relaxation.spheres();
+  }
+  largest_overlap_ = std::max(largest_overlap_, least);
+  place(movable, best);
 }
 
 void Refill::place(const std::vector<int>& atoms, const std::vector<Sphere>& now) {

@@ -74,7 +74,8 @@ std::optional<Vec3> SiteChoice::of(std::size_t k) const {
     double cost = weight_of_way * way * way;
     if (cost >= least) return false;
     cost += overlaps(there, {site, from.radius}, store.frame_of(e.body));
-    if (cost >= least || walls_.near(k, there, wall_gap_) || !clear_(i, there)) return false;
+    if (cost >= least || walls_.near(k, there, wall_gap_) || walls_.between(k, from, there.centre) || !clear_(i, there))
+      return false;
     best = site;
     least = cost;
     return false;  // look on

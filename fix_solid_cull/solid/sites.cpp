@@ -24,7 +24,7 @@ PackedTile::PackedTile() : edge(std::cbrt(spheres * (M_PI / 6) / solid_fraction)
       centre[d] = edge * static_cast<double>(scrambled(static_cast<std::uint64_t>(3 * n + d + 1)) >> 11) * 0x1p-53;
     scattered.push_back({centre, 0.5});
   }
-  SphereRelaxation relaxation(std::move(scattered), {}, {}, Vec3::Constant(edge));
+  SphereRelaxation relaxation({std::move(scattered), {}, {}, {}}, Vec3::Constant(edge));
   largest_overlap = relaxation.relax(sweeps_at_most, overlap_allowed);
   for (const Sphere& s : relaxation.spheres()) {
     Vec3 c = s.centre;

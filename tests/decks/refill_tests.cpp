@@ -31,6 +31,8 @@ Bed periodic() {
 /// Largest overlap of two granules, as a share of the radii's sum.
 double largest_overlap(const State& s, const Bed& b) {
   double largest = 0;
+  int bins[6] = {};
+  const double limit[6] = {.001, .003, .01, .03, .1, .3};
   for (auto i = s.begin(); i != s.end(); ++i)
     for (auto j = std::next(i); j != s.end(); ++j) {
       double square = 0;
@@ -39,8 +41,11 @@ double largest_overlap(const State& s, const Bed& b) {
         if (b.periodic && d < 2) way -= b.side * std::round(way / b.side);
         square += way * way;
       }
-      largest = std::max(largest, 1 - std::sqrt(square) / (i->second.radius + j->second.radius));
+      const double o = 1 - std::sqrt(square) / (i->second.radius + j->second.radius);
+      largest = std::max(largest, o);
+      for (int k = 0; k < 6; ++k) bins[k] += o > limit[k];
     }
+  std::printf("DIAG >.001 %d >.003 %d >.01 %d >.03 %d >.1 %d >.3 %d\n", bins[0], bins[1], bins[2], bins[3], bins[4], bins[5]);
   return largest;
 }
 
