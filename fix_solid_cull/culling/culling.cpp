@@ -437,6 +437,11 @@ void Culling::change() {
   p_.grounding.let_go();
   if (changes || p_.ports.ranks.count > 1) p_.index.index(p_.ports.atoms);
   if (changes) c.free_and_lock();
+  if (p_.scales.refills() && p_.ports.ranks.count > 1)  // over there they may have other sites, where the shell is not closed
+    for (const std::int64_t tag : p_.handover.stored_elsewhere()) {
+      p_.exchange.bring_back(tag);
+      shell_changed = true;
+    }
   close_shell(changes, shell_changed);  // before contacts thaw: what they are given to must be atoms
   refill(shell_changed);
   if (changes) {

@@ -15,6 +15,7 @@ namespace {
 constexpr double gap_between_sites = 0.3;  // of the radii's sum
 // how far a free site is looked for: at first, and in the end (diameters)
 constexpr double near_site = 1.5, far_site = 50;
+constexpr double at_a_site = 1e-6;  // radii
 
 }  // namespace
 
@@ -262,11 +263,14 @@ void Solid::leaves_store(std::int64_t tag) {
   });
 }
 
-/// Where a granule must go, however far that is; where all is taken, two share a site.
+/// Where a granule must go, however far that is. What is at a site already stays, taken or not: it may come from another rank.
+/// Where all is taken, two share a site.
 Vec3 Solid::free_site(int body, const Vec3& place, double radius) const {
+  const Vec3 nearest = sites_->place(sites_->nearest(place, radius));
+  if ((nearest - place).norm() < at_a_site * radius) return nearest;
   for (double reach = near_site; reach < far_site; reach *= 2)
     if (const auto site = store_->free_site(body, place, radius, reach, [](const Vec3&) { return true; })) return *site;
-  return sites_->place(sites_->nearest(place, radius));
+  return nearest;
 }
 
 StoredGranule Solid::as_stored(const StoredGranule& g) {
