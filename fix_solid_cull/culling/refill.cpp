@@ -10,13 +10,13 @@
 namespace solidcull {
 namespace {
 
-constexpr int sweeps_alone = 400;
+constexpr int sweeps_alone = 250;
 // ranks show each other what they have packed so many times
-constexpr int rounds_beside_others = 6, sweeps_in_a_round = 80;
+constexpr int rounds_beside_others = 5, sweeps_in_a_round = 50;
 constexpr double overlap_allowed = 1e-4;  // of the radii's sum
 // what overlaps by more after that is caught between others: it looks for room elsewhere, so many times at most
-constexpr double caught = 0.02;  // of the radii's sum
-constexpr int new_beginnings = 10, sweeps_again = 100;
+constexpr double caught = 0.03;  // of the radii's sum
+constexpr int new_beginnings = 6, sweeps_again = 60;
 constexpr double longest_way = 4, next_place = 3;  // diameters
 
 }  // namespace

@@ -36,7 +36,9 @@ void ShellClosure::merged(int gone, int kept, bool same_frame) {
 ShellClosure::Foreign ShellClosure::as_foreign(int i) const {
   const Locked& e = shell_[i];
   const bool in_body = e.in_body();  // else it has just been chosen
-  return {ports_.atoms.sphere(i), in_body ? groups_.key_of(e.body) : 0, in_body && solid_.stands(e.body)};
+  // bodies that stand do not touch what is stored in each other, but at sites
+  const bool stands = in_body && solid_.stands(e.body) && !scales_.refills();
+  return {ports_.atoms.sphere(i), in_body ? groups_.key_of(e.body) : 0, stands};
 }
 
 void ShellClosure::share() {
@@ -164,6 +166,7 @@ void ShellClosure::find_near_granules(std::set<std::int64_t>& near) {
         if (v.who.body == f.key || (f.stands && (v.who.stands || v.clear))) return true;
         const Vec3 at = f.pose->to_frame(s.centre + shift);
         solid_.store().for_each_near(f.number, {at, s.radius}, gap, [&](const Resident& g) {
+          if (v.who.body && groups_.key_of(g.body) == v.who.body) return;  // in the frame that bodies share
           const double reach = s.radius + g.radius + skin;
           if ((g.position - at).squaredNorm() < reach * reach) near.insert(g.tag);
           if (f.stands) v.atom = -1;
