@@ -14,11 +14,15 @@ NearWalls::NearWalls(const Walls& walls, const std::vector<Sphere>& spheres, dou
   for (const Sphere& s : spheres) edge = std::max(edge, 2 * s.radius);
   cells.build(spheres, edge);
   const Vec3 around = Vec3::Constant(cells.largest_radius() + reach);
-  for (std::size_t t = 0; t < triangles_.size(); ++t)
-    cells.for_each_in_box(triangles_[t].box.lo - around, triangles_[t].box.hi + around, [&](std::size_t k, const Sphere& s) {
-      if (walls_.near(triangles_[t], s, reach)) around_[k].triangles.push_back(t);
+  for (std::size_t t = 0; t < triangles_.size(); ++t) {
+    // by the box: an engine may leave an edge to the triangle beyond it, so that a sphere that is not over this one is not near it
+    const Box& box = triangles_[t].box;
+    cells.for_each_in_box(box.lo - around, box.hi + around, [&](std::size_t k, const Sphere& s) {
+      const Vec3 outside = (box.lo - s.centre).cwiseMax(s.centre - box.hi).cwiseMax(0.0);
+      if (outside.norm() < s.radius + reach) around_[k].triangles.push_back(t);
       return true;
     });
+  }
   for (std::size_t k = 0; k < spheres.size(); ++k) around_[k].primitive = walls_.primitive_near(spheres[k], reach);
 }
 

@@ -10,8 +10,7 @@
 namespace solidcull {
 namespace {
 
-// what is no farther apart in a store that keeps sites hangs together there: granules that touched may have sites that do not, and
-// what has been one body must stay one
+// what is no farther apart in a store that keeps sites hangs together there
 constexpr double gap_between_sites = 0.3;  // of the radii's sum
 // how far a free site is looked for: at first, and in the end (diameters)
 constexpr double near_site = 1.5, far_site = 50;
@@ -129,6 +128,12 @@ std::vector<Solid::Merge> Solid::adopt_swallowed() {
     if (scales_.compact() && !same) turn_inner_histories(gone.first, turn);
     if (store_->holds(gone.first) && store_->frame_of(gone.first) != GranuleStore::shared_frame)
       ++standing_version_;  // its granules may stand from now on
+    std::vector<std::int64_t> moved;
+    if (scales_.refills() && !same) {
+      store_->for_each_of_body(gone.first, [&](const Resident& g) { moved.push_back(g.tag); });
+      for (const std::int64_t tag : moved)
+        contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { contacts_.add(tag, partner, nullptr); });
+    }
     store_->merge(gone.first, body, [&](StoredGranule& g) {
       if (same) return;
       g.position = to.to_frame(from.to_world(g.position));
@@ -139,6 +144,7 @@ std::vector<Solid::Merge> Solid::adopt_swallowed() {
       bodies_.relocate(body, {g.mass, g.position, g.radius, g.held}, site);
       g.position = site;
     });
+    for (const std::int64_t tag : moved) drop_what_sites_tell(tag);
     wall_loads_.merge(gone.first, body);
     tell([&](BodyFollower& f) { f.merged(gone.first, body, same); });
     if (scales_.sleeping()) find_grid(body);
@@ -227,7 +233,7 @@ void Solid::entered_store(std::int64_t tag) {
   bodies_.leave(tag);
   if (scales_.refills()) {
     contacts_.forget_histories(tag);
-    contacts_.drop(tag, [&](std::int64_t partner) { return store_->contains(partner); });
+    drop_what_sites_tell(tag);
   }
   if (!scales_.compact()) return;
   const Resident g = *store_->find(tag);
@@ -243,6 +249,13 @@ void Solid::entered_store(std::int64_t tag) {
   });
   if (!tail.empty()) store_->set_tail(tag, tail);
   contacts_.drop(tag, [&](std::int64_t partner) { return store_->contains(partner); });
+}
+
+/// What touched and has sites farther apart still hangs together: that stays in the graph.
+void Solid::drop_what_sites_tell(std::int64_t tag) {
+  std::vector<std::int64_t> told;
+  contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { told.push_back(partner); });
+  contacts_.drop(tag, [&](std::int64_t partner) { return std::find(told.begin(), told.end(), partner) != told.end(); });
 }
 
 void Solid::leaves_store(std::int64_t tag) {

@@ -175,6 +175,7 @@ class Solid {
   void find_grid(int body);
   void entered_store(std::int64_t tag);
   void leaves_store(std::int64_t tag);
+  void drop_what_sites_tell(std::int64_t tag);
   Vec3 apart(const Resident& a, const Resident& b) const;
   void turn_inner_histories(int body, const Eigen::Matrix3d& by);
   template <class Tell>

@@ -166,20 +166,6 @@ TEST(RefillScenes, ARestartHoldsThemAll) {
 }
 
 /// Between runs the deck moves a stored granule and takes others out.
-TEST(RefillScenes, XExactDeckSees) {
-  const Bed b = bed("refill");
-  Engine e;
-  e.run(read_bed(b) + culling + "exterior sleep\nrun 300\n");
-  e.run("group few id <= 40\nset group few density 2600\ngroup gone id > 1290\ndelete_atoms group gone compress no\nrun 100\n");
-  expect_all_there(e, "cull", 1290);
-}
-TEST(RefillScenes, XSetOnly) {
-  const Bed b = bed("refill");
-  Engine e;
-  e.run(read_bed(b) + culling + "exterior sleep" + refill + "run 300\n");
-  e.run("group few id <= 40\nset group few density 2600\nrun 100\n");
-  expect_all_there(e, "cull", 1300);
-}
 TEST(RefillScenes, TheDeckSeesAndChangesTheWholeBed) {
   const Bed b = bed("refill");
   Engine e;
