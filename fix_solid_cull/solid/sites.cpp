@@ -109,11 +109,13 @@ Sites::Number Sites::nearest(const Vec3& place, double radius) const {
   const int level = level_of(radius);
   const Vec3 at = place / size(level);
   Found best{0, HUGE_VAL};
-  // no hole of the tile is so large that none is found
-  for (double reach = 1e-6; !(best.square <= reach * reach); reach = reach < 0.5 ? 1 : 2 * reach)
+  // most places are those of sites; and no hole of the tile is so large that none is found
+  for (const double reach : {1e-6, 1.0, 2.0}) {
     for_each_near(at, reach, level, [&](Number site, double square) {
       if (square < best.square) best = {site, square};
     });
+    if (best.square <= reach * reach) break;
+  }
   return best.site;
 }
 
