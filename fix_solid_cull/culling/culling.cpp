@@ -57,8 +57,7 @@ void Culling::refuse_what_lies_too_far() const {
   char told[64];
   std::snprintf(told, sizeof told, "%.4g m from the origin, and the box reaches %.4g m", farthest / 2, far / 2);
   throw InputError("store " + std::string(p_.scales.compact() ? "compact keeps places" : "none has sites") + " up to " +
-                   std::string(told) +
-                   ": move the origin to the granules, or use store exact");
+                   std::string(told) + ": move the origin to the granules, or use store exact");
 }
 
 void Culling::find_scales() {

@@ -15,7 +15,8 @@ NearWalls::NearWalls(const Walls& walls, const std::vector<Sphere>& spheres, dou
   cells.build(spheres, edge);
   const Vec3 around = Vec3::Constant(cells.largest_radius() + reach);
   for (std::size_t t = 0; t < triangles_.size(); ++t) {
-    // by the box: an engine may leave an edge to the triangle beyond it, so that a sphere that is not over this one is not near it
+    // by the box: an engine may leave an edge to the triangle beyond it, so that a sphere that is not over this one is not near
+    // it
     const Box& box = triangles_[t].box;
     cells.for_each_in_box(box.lo - around, box.hi + around, [&](std::size_t k, const Sphere& s) {
       const Vec3 outside = (box.lo - s.centre).cwiseMax(s.centre - box.hi).cwiseMax(0.0);

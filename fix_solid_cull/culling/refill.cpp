@@ -10,13 +10,14 @@
 namespace solidcull {
 namespace {
 
-constexpr int sweeps_alone = 250;
-// ranks show each other what they have packed so many times
-constexpr int rounds_beside_others = 5, sweeps_in_a_round = 50;
-constexpr double overlap_allowed = 1e-4;  // of the radii's sum
+constexpr int sweeps_alone = 200;
+// ranks show each other what they have packed so many times; in turns they look for room, so that no two find the same
+constexpr int rounds_beside_others = 8, sweeps_in_a_round = 40;
+constexpr double overlap_allowed = 1e-3;  // of the radii's sum: as resting granules have
+constexpr double clear_of_walls = 0.5;    // diameters: nobody asks for walls within so far of a place where none was so near
 // what overlaps by more after that is caught between others: it looks for room elsewhere, so many times at most
 constexpr double caught = 0.03;  // of the radii's sum
-constexpr int new_beginnings = 6, sweeps_again = 60;
+constexpr int new_beginnings = 4, sweeps_again = 60;
 constexpr double longest_way = 4, next_place = 3;  // diameters
 
 }  // namespace
@@ -28,13 +29,14 @@ bool Refill::pack() {
   std::sort(newcomers_.begin(), newcomers_.end());
   newcomers_.erase(std::unique(newcomers_.begin(), newcomers_.end()), newcomers_.end());
   if (!ports_.ranks.has_neighbours())
-    pack(sweeps_alone);
+    pack(sweeps_alone, true);
   else
-    for (int round = 0; round < rounds_beside_others; ++round) pack(sweeps_in_a_round);
+    for (int round = 0; round < rounds_beside_others; ++round)
+      pack(sweeps_in_a_round, round + 1 < rounds_beside_others && (round + ports_.ranks.me) % 2 == 0);
   return true;
 }
 
-void Refill::pack(int sweeps) {
+void Refill::pack(int sweeps, bool look_for_room) {
   const Atoms& atoms = ports_.atoms;
   struct Row {
     Triple at;
@@ -85,13 +87,18 @@ void Refill::pack(int sweeps) {
   SphereRelaxation relaxation(std::move(spheres), periods);
   const std::vector<Sphere> before = relaxation.spheres();
   const NearWalls walls(ports_.walls, before, way);
+  const double clear = clear_of_walls * scales_.diameter();
+  std::vector<Vec3> clear_at(before.size(), Vec3::Constant(HUGE_VAL));
   relaxation.keep_to([&](std::size_t k, const Vec3& place) {
-    return (place - before[k].centre).squaredNorm() < way * way && ports_.run.keeps(place) &&
-           !walls.near(k, {place, before[k].radius}, 0);
+    if ((place - before[k].centre).squaredNorm() >= way * way || !ports_.run.keeps(place)) return false;
+    if ((place - clear_at[k]).squaredNorm() < clear * clear) return true;
+    if (walls.near(k, {place, before[k].radius}, clear)) return !walls.near(k, {place, before[k].radius}, 0);
+    clear_at[k] = place;
+    return true;
   });
   double least = relaxation.relax(sweeps, overlap_allowed);
   std::vector<Sphere> best = relaxation.spheres();
-  for (int n = 0; n < new_beginnings && least > caught; ++n) {
+  for (int n = 0; look_for_room && n < new_beginnings && least > caught; ++n) {
     if (relaxation.reseat(caught, next_place * scales_.diameter()) == 0) break;
     const double overlap = relaxation.relax(sweeps_again, overlap_allowed);
     if (overlap >= least) continue;

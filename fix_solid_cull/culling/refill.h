@@ -30,7 +30,7 @@ class Refill {
   double largest_overlap() const { return largest_overlap_; }
 
  private:
-  void pack(int sweeps);
+  void pack(int sweeps, bool look_for_room);
   void place(const std::vector<int>& atoms, const std::vector<Sphere>& now);
 
   const Ports& ports_;

@@ -440,10 +440,9 @@ std::size_t ShellClosure::store_what_is_deep(bool locked_now, bool membership_ch
 /// Where no site will do they stay.
 std::size_t ShellClosure::put_away_at_sites(const std::vector<int>& deep, const Surroundings& surroundings) {
   const double wall_gap = (wall_gap_in_skins + wall_check_in_skins) * ports_.run.skin;
-  const SiteChoice choice(ports_, scales_, solid_, shell_, deep, wall_gap,
-                          [&](int i, const Sphere& there) {
-                            return !surroundings.near(i, there) && ports_.ranks.owns(there.centre);
-                          });
+  const SiteChoice choice(ports_, scales_, solid_, shell_, deep, wall_gap, [&](int i, const Sphere& there) {
+    return !surroundings.near(i, there) && ports_.ranks.owns(there.centre);
+  });
   std::size_t went = 0;
   for (std::size_t k = 0; k < deep.size(); ++k)
     if (const auto site = choice.of(k)) {

@@ -5,7 +5,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double search = 1.5;         // in diameters of the sites
+constexpr double search = 1.5;          // in diameters of the sites
 constexpr double weight_of_way = 0.02;  // of the way to a site in its diameters, squared, beside overlaps in shares, squared
 
 std::vector<Sphere> spheres_of(const Atoms& atoms, const std::vector<int>& which) {

@@ -131,8 +131,8 @@ void Snapshot::take_up() {
                      " numbers and this deck's contact model has " + std::to_string(solid_.contacts().width()) +
                      ": use the contact model that the file was written with");
   if ((h[no_places] != 0) != scales_.refills() && h[interior] > 0)
-    throw InputError(std::string("the restart file was written with 'store ") + (scales_.refills() ? "exact' or 'compact" : "none") +
-                     "': read it with that store");
+    throw InputError(std::string("the restart file was written with 'store ") +
+                     (scales_.refills() ? "exact' or 'compact" : "none") + "': read it with that store");
   index_.index(ports_.atoms);
   const std::vector<Parcel> parcels = parcels_.unpack(h + header_size, state.size() - header_size, solid_.contacts().width());
   const bool same_ranks =

@@ -147,7 +147,8 @@ Settings parse_settings(const std::vector<std::string>& words) {
   }
   if (s.depth < 0) s.depth = s.exterior == Exterior::live ? 2.0 : 0.0;
   if (s.store == Store::none && s.restore != Restore::refill)
-    throw InputError("keyword 'store' has the value 'none' and 'restore' the value 'exact': say 'restore refill', or store granules");
+    throw InputError(
+        "keyword 'store' has the value 'none' and 'restore' the value 'exact': say 'restore refill', or store granules");
   if (s.store != Store::none && s.restore == Restore::refill)
     throw InputError("keyword 'restore' has the value 'refill' and 'store' keeps granules: say 'store none', or 'restore exact'");
   if (s.exterior == Exterior::live && s.depth == 0)

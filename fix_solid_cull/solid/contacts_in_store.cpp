@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-
 namespace solidcull {
 namespace {
 
@@ -28,8 +27,8 @@ void for_each_image(const Vec3& place, const Vec3& lo, const Vec3& hi, double re
 
 }  // namespace
 
-void contacts_in_store(const GranuleStore& store, const SolidBodies& bodies, std::int64_t tag,
-                       double gap, std::vector<std::int64_t>& partners) {
+void contacts_in_store(const GranuleStore& store, const SolidBodies& bodies, std::int64_t tag, double gap,
+                       std::vector<std::int64_t>& partners) {
   const auto found = store.find(tag);
   if (!found) return;
   const Resident& granule = *found;
@@ -44,8 +43,9 @@ void contacts_in_store(const GranuleStore& store, const SolidBodies& bodies, std
   };
   look_around(granule.position);
   if ((bodies.periods().array() > 0).any())
-    for_each_image(granule.position, store.lowest(frame), store.highest(frame), granule.radius + store.largest_radius() + farthest,
-                   bodies.periods(), frame == GranuleStore::shared_frame ? Pose() : bodies.pose(granule.body),
+    for_each_image(granule.position, store.lowest(frame), store.highest(frame),
+                   granule.radius + store.largest_radius() + farthest, bodies.periods(),
+                   frame == GranuleStore::shared_frame ? Pose() : bodies.pose(granule.body),
                    [&](const Vec3& shift) { look_around(granule.position + shift); });
 }
 

@@ -52,8 +52,8 @@ class GranuleStore {
   static constexpr int shared_frame = 0;  ///< that of all bodies that share(); any other frame has the number of its body
 
   /// All comes back to the bit; or normal_load and load_change are rounded to 0.2 %, and places to 2^-27 of the search cells'
-  /// edge, as by rounded(). A place more than 32,768 cells from the origin of its frame is a std::range_error then. Or no place is
-  /// kept but the number of the nearest site, and of the loads normal_load alone.
+  /// edge, as by rounded(). A place more than 32,768 cells from the origin of its frame is a std::range_error then. Or no place
+  /// is kept but the number of the nearest site, and of the loads normal_load alone.
   enum class Precision { exact, rounded, sites };
   static constexpr double farthest = 32768;  ///< cells
   StoredGranule rounded(StoredGranule granule) const;

@@ -98,8 +98,7 @@ void Sites::for_each_near(const Vec3& at, double reach, int level, Visit visit) 
         const Vec3 corner(static_cast<double>(tile[0]), static_cast<double>(tile[1]), static_cast<double>(tile[2]));
         for (const int n : cell_[static_cast<std::size_t>((cell[0] * cells_ + cell[1]) * cells_ + cell[2])]) {
           Number site = static_cast<Number>(level) | static_cast<Number>(n) << level_bits;
-          for (int d = 0; d < 3; ++d)
-            site |= static_cast<Number>(tile[d] + half) << (level_bits + sphere_bits + d * tile_bits);
+          for (int d = 0; d < 3; ++d) site |= static_cast<Number>(tile[d] + half) << (level_bits + sphere_bits + d * tile_bits);
           visit(site, (tile_.edge * corner + tile_.centres[static_cast<std::size_t>(n)] - at).squaredNorm());
         }
       }

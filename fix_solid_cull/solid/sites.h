@@ -12,7 +12,8 @@ namespace solidcull {
 /// A periodic tile of random close-packed unit spheres (diameter 1), the same in each run on each machine.
 struct PackedTile {
   static constexpr int spheres = 512;
-  static constexpr double solid_fraction = 0.625;  ///< a little denser than granules pack under their weight: some sites stay free
+  static constexpr double solid_fraction =
+      0.625;  ///< a little denser than granules pack under their weight: some sites stay free
   static const PackedTile& one();
   PackedTile();
   double edge;  ///< in diameters

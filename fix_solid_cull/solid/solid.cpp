@@ -261,8 +261,7 @@ void Solid::drop_what_sites_tell(std::int64_t tag) {
 void Solid::leaves_store(std::int64_t tag) {
   const Resident g = *store_->find(tag);
   bodies_.take_in(tag, g.body);
-  if (scales_.refills())
-    contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { contacts_.add(tag, partner, nullptr); });
+  if (scales_.refills()) contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { contacts_.add(tag, partner, nullptr); });
   if (!scales_.compact()) return;
   std::vector<double> history(contacts_.width());
   std::vector<std::uint64_t> tail;

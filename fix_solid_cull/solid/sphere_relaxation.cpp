@@ -135,8 +135,7 @@ double SphereRelaxation::sweep(double soft_share) {
       move(p.free, soft ? Vec3(soft_share * away) : away);
     }
   }
-  for (std::size_t k = 0; k < free_.size(); ++k)
-    strayed = std::max(strayed, (free_[k].centre - listed_at_[k]).squaredNorm());
+  for (std::size_t k = 0; k < free_.size(); ++k) strayed = std::max(strayed, (free_[k].centre - listed_at_[k]).squaredNorm());
   if (strayed > 0.25 * margin_ * margin_) list_pairs();
   return largest;
 }
