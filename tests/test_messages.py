@@ -185,7 +185,7 @@ class DeckRefusals(Case):
     def test_sites_far_from_the_origin(self):
         far = deck(FIX + " store none restore refill", "run 0", box="block 200 200.012 0 0.012 -0.001 0.04")
         self.refused_by_fix(far.replace("single 0.006", "single 200.006"),
-                            "store none has sites up to 46.31 m from the origin, and the box reaches 200 m: "
+                            "store none has sites up to 46.33 m from the origin, and the box reaches 200 m: "
                             "move the origin to the granules, or use store exact")
 
     def test_run_style(self):
