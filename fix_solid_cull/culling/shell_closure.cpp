@@ -441,7 +441,9 @@ std::size_t ShellClosure::store_what_is_deep(bool locked_now, bool membership_ch
 std::size_t ShellClosure::put_away_at_sites(const std::vector<int>& deep, const Surroundings& surroundings) {
   const double wall_gap = (wall_gap_in_skins + wall_check_in_skins) * ports_.run.skin;
   const SiteChoice choice(ports_, scales_, solid_, shell_, deep, wall_gap, [&](int i, const Sphere& there) {
-    return !surroundings.near(i, there) && ports_.ranks.owns(there.centre);
+    // where it would lie: through a periodic side others are near than beyond it
+    const Sphere in_box{ports_.run.wrapped(there.centre), there.radius};
+    return ports_.ranks.owns(in_box.centre) && !surroundings.near(i, in_box);
   });
   std::size_t went = 0;
   for (std::size_t k = 0; k < deep.size(); ++k)
