@@ -182,6 +182,12 @@ class DeckRefusals(Case):
                                  "move the origin to the granules, or use store exact")
         self.accepted(far.replace(" store compact", ""))
 
+    def test_sites_far_from_the_origin(self):
+        far = deck(FIX + " store none restore refill", "run 0", box="block 200 200.012 0 0.012 -0.001 0.04")
+        self.refused_by_fix(far.replace("single 0.006", "single 200.006"),
+                            "store none has sites up to 46.33 m from the origin, and the box reaches 200 m: "
+                            "move the origin to the granules, or use store exact")
+
     def test_run_style(self):
         self.refused_by_fix(deck(FIX, "run_style respa 2 2", "run 0"), "run_style 'respa' is not supported: use run_style verlet")
 
@@ -239,6 +245,7 @@ class KeywordRefusals(Case):
     TOLERANCE = "two numbers A R, 0 or more and not both 0"
     CARVE = "two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"
     VOXEL = "a size in mean diameters, 0.1 to 2"
+    STORE = "'exact', 'compact' or 'none'"
     FILE = STEPS + ", and a file name"
     MESH = "a file name that ends with .vdb, .stl or .vtp"
     BED = "a file name that ends with .vtp"
@@ -255,8 +262,8 @@ class KeywordRefusals(Case):
         "carve x 4": ("carve", "x", CARVE), "carve 2 0.5": ("carve", "0.5", CARVE), "carve 2": ("carve", None, CARVE),
         "motion free": ("motion", "free", "'rigid' or 'fixed'"), "motion": ("motion", None, "'rigid' or 'fixed'"),
         "walls open": ("walls", "open", "'closed' or 'surface'"), "walls": ("walls", None, "'closed' or 'surface'"),
-        "store none": ("store", "none", "'exact' or 'compact'"), "store": ("store", None, "'exact' or 'compact'"),
-        "restore refill": ("restore", "refill", "'exact'"), "restore": ("restore", None, "'exact'"),
+        "store some": ("store", "some", STORE), "store": ("store", None, STORE),
+        "restore new": ("restore", "new", "'exact' or 'refill'"), "restore": ("restore", None, "'exact' or 'refill'"),
         "voxel fine": ("voxel", "fine", VOXEL), "voxel 0.05": ("voxel", "0.05", VOXEL), "voxel": ("voxel", None, VOXEL),
         "mesh x a.stl": ("mesh", "x", FILE), "mesh 10 a.obj": ("mesh", "a.obj", MESH), "mesh 10": ("mesh", None, MESH),
         "bed 0 a.vtp": ("bed", "0", FILE), "bed 10 a.stl": ("bed", "a.stl", BED), "bed": ("bed", None, FILE),
@@ -275,6 +282,14 @@ class KeywordRefusals(Case):
                 self.refused_by_fix(deck(f"{FIX} {words}", granules=False),
                                     "keyword 'depth' has the value '0' and 'exterior' the value 'live': give a cover of more than 0, "
                                     "or say 'exterior sleep'")
+
+    def test_store_none_and_restore_refill_go_together(self):
+        self.refused_by_fix(deck(FIX + " store none", granules=False),
+                            "keyword 'store' has the value 'none' and 'restore' the value 'exact': say 'restore refill', or store "
+                            "granules")
+        self.refused_by_fix(deck(FIX + " restore refill", granules=False),
+                            "keyword 'restore' has the value 'refill' and 'store' keeps granules: say 'store none', or 'restore exact'")
+        self.accepted(deck(FIX + " store none restore refill", "run 0"))
 
     def test_each_keyword_is_tested(self):
         self.assertEqual(", ".join(sorted({k for k, _, _ in self.WRONG.values()})), self.KEYWORDS)

@@ -105,6 +105,19 @@ class Restart(Case):
     def test_the_fix_follows_read_restart(self):
         self.goes_on(lambda file: resumed(file, f"{CULL_BLOCK}\nrun {AFTER}\n", END), itertools.product(RANKS, RANKS))
 
+    def test_a_file_of_a_store_that_knows_no_places(self):
+        none = CULL_BLOCK + " store none restore refill"
+        for written, read in SOME:
+            with self.subTest(written_on=written, read_on=read):
+                file = self.place / f"none-{written}.restart"
+                self.accepted(BLOCK + BALL + f"{none}\nrun {BEFORE}\nwrite_restart {file}\n", ranks=written)
+                end = self.end_of(resumed(file, f"{none}\nrun {AFTER}\n", END), read)
+                self.assertEqual(sorted(end), sorted(self.straight()))
+                self.refused_by_fix(resumed(file, f"{CULL_BLOCK}\nrun 0\n"),
+                                    "the restart file was written with 'store none': read it with that store", ranks=read)
+        self.refused_by_fix(resumed(self.file(1), f"{none}\nrun 0\n"),
+                            "the restart file was written with 'store exact' or 'compact': read it with that store")
+
     def test_a_file_of_fixed_bodies_read_as_rigid_ones(self):
         for ranks in (1, 2):
             with self.subTest(ranks=ranks):

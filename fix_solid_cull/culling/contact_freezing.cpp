@@ -122,6 +122,14 @@ void ContactFreezing::thaw(const Changes& changes) {
       }
     });
   }
+  if (scales_.refills()) {
+    kept_.clear();
+    for (const Given& g : given) kept_.insert(ordered(ports_.atoms.tag[g.atom], g.partner));
+    const HistoryRows rows = ports_.contacts.histories();
+    for (const std::int64_t tag : freed)
+      if (const int* i = index_.find(tag))
+        rows.for_each_partner(*i, [&](std::int64_t partner, const double*) { kept_.insert(ordered(tag, partner)); });
+  }
   std::sort(given.begin(), given.end(),
             [](const Given& a, const Given& b) { return std::tie(a.atom, a.history) < std::tie(b.atom, b.history); });
   std::vector<Contacts::History> of_one;
@@ -134,8 +142,23 @@ void ContactFreezing::thaw(const Changes& changes) {
   thawed_ = changes.freed_anywhere;
 }
 
+/// Half of force times overlap: exact for Hooke's law, a quarter too much for Hertz's.
+void ContactFreezing::count_energy_of_new_contacts() const {
+  const Atoms& atoms = ports_.atoms;
+  double energy = 0;
+  ports_.contacts.neighbours().for_each_pair(atoms.owned, [&](int i, int j, int k) {
+    if (!thawed_.contains(atoms.tag[i]) && !thawed_.contains(atoms.tag[j])) return;
+    const double overlap = atoms.radius[i] + atoms.radius[j] - (atoms.place(i) - atoms.place(j)).norm();
+    if (overlap <= 0 || kept_.count(ordered(atoms.tag[i], atoms.tag[j]))) return;
+    const double share = j < atoms.owned ? 1.0 : 0.5;  // another rank sees it, too
+    energy += share * 0.5 * ports_.contacts.force_on_first(i, k).norm() * overlap;
+  });
+  solid_.count_refilled(energy);
+}
+
 void ContactFreezing::rebase_thawed() {
   if (thawed_.empty()) return;
+  if (scales_.refills()) count_energy_of_new_contacts();
   const Atoms& atoms = ports_.atoms;
   const int owned = atoms.owned;
   ports_.contacts.neighbours().for_each_pair(owned, [&](int i, int j, int k) {

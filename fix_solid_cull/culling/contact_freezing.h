@@ -11,6 +11,7 @@
 #include "flat_map.h"
 #include "ports.h"
 #include "proposal.h"
+#include "scales.h"
 #include "shell.h"
 #include "solid.h"
 
@@ -26,8 +27,9 @@ struct Changes {
 /// Local, but for freeze_between_merged().
 class ContactFreezing {
  public:
-  ContactFreezing(const Ports& ports, Solid& solid, Shell& shell, const AtomIndex& index, BodyGroups& groups)
-      : ports_(ports), solid_(solid), shell_(shell), index_(index), groups_(groups) {}
+  ContactFreezing(const Ports& ports, const Scales& scales, Solid& solid, Shell& shell, const AtomIndex& index,
+                  BodyGroups& groups)
+      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), index_(index), groups_(groups) {}
 
   /// Contacts of what is to be freed go back to the engine. Whatever they are given to must be an atom by now.
   void thaw(const Changes& changes);
@@ -36,7 +38,7 @@ class ContactFreezing {
   /// Two bodies that touched have become one: what the engine saw between them goes inside too. Collective.
   void freeze_between_merged();
   /// At the first forces after thaw(): a contact that came out of the body brings the load that it had inside, no change for the
-  /// granule that stays.
+  /// granule that stays. What contacts hold that were made anew by `restore refill` is energy added.
   void rebase_thawed();
 
  private:
@@ -48,12 +50,16 @@ class ContactFreezing {
   bool just_locked(int i) const;
   void rebase(int i, std::int64_t partner, const double* history);
 
+  void count_energy_of_new_contacts() const;
+
   const Ports& ports_;
+  const Scales& scales_;
   Solid& solid_;
   Shell& shell_;
   const AtomIndex& index_;
   BodyGroups& groups_;
   FlatMap<char> thawed_;  // granules that were freed in the last change, here or near
+  TagPairs kept_;         // with `restore refill`: contacts of theirs that have a history, lower tag first
 };
 
 }  // namespace solidcull

@@ -51,12 +51,13 @@ void Culling::begin_run() {
 void Culling::refuse_what_lies_too_far() const {
   // twice the way to the farthest corner: places wait in the frames of bodies that may have moved through the box
   const Vec3 corner = p_.ports.run.box.lo.cwiseAbs().cwiseMax(p_.ports.run.box.hi.cwiseAbs());
-  const double far = 2 * corner.norm(), farthest = GranuleStore::farthest * 2 * p_.scales.diameter();
+  const double far = 2 * corner.norm(), d = p_.scales.diameter();
+  const double farthest = p_.scales.compact() ? GranuleStore::farthest * 2 * d : Sites(d).farthest();
   if (far <= farthest) return;
   char told[64];
   std::snprintf(told, sizeof told, "%.4g m from the origin, and the box reaches %.4g m", farthest / 2, far / 2);
-  throw InputError("store compact keeps places up to " + std::string(told) +
-                   ": move the origin to the granules, or use store exact");
+  throw InputError("store " + std::string(p_.scales.compact() ? "compact keeps places" : "none has sites") + " up to " +
+                   std::string(told) + ": move the origin to the granules, or use store exact");
 }
 
 void Culling::find_scales() {
@@ -82,7 +83,7 @@ void Culling::find_scales() {
   if (diameter == 0) return;  // an empty box: the first granules set the scale
   p_.scales.make_laws(p_.ports.run.dt);
   if (p_.solid.has_store()) return;
-  if (p_.scales.compact()) refuse_what_lies_too_far();
+  if (p_.scales.image_by_place()) refuse_what_lies_too_far();
   p_.solid.open_store();
 }
 
@@ -428,22 +429,32 @@ void Culling::change() {
   // another fix may have deleted granules in this hook
   if (phase_ == Phase::stepping && p_.lost.forget_lost()) settle_bodies();
   p_.ports.memory.freed(p_.exchange.begin_change());
+  p_.refill.begin_change();
   MembershipChange c(p_.for_change(), p_.wake.take(p_.ports.ranks), proposal_.take());
   const bool changes = p_.ports.ranks.any(c.any_here() || p_.grounding.lets_go() || open_for_insertion_);
   bool shell_changed = false;
   p_.grounding.let_go();
   if (changes || p_.ports.ranks.count > 1) p_.index.index(p_.ports.atoms);
   if (changes) c.free_and_lock();
+  if (p_.scales.refills() && p_.ports.ranks.count > 1)  // over there they may have other sites, where the shell is not closed
+    for (const std::int64_t tag : p_.handover.stored_elsewhere()) {
+      p_.exchange.bring_back(tag);
+      shell_changed = true;
+    }
   close_shell(changes, shell_changed);  // before contacts thaw: what they are given to must be atoms
+  refill(shell_changed);
   if (changes) {
     c.thaw_and_unlock();
     c.freeze_and_lock();
     p_.groups.settle();
     c.finish_bodies();
     p_.census.count_bodies();
-    if (p_.census.several_bodies()) close_shell(true, shell_changed);  // parts that came off face each other now
+    // parts that came off face each other now, or merged bodies have found other sites
+    if (p_.census.several_bodies() || p_.scales.refills()) close_shell(true, shell_changed);
+    refill(shell_changed);
   }
   store_and_fetch(c, changes, shell_changed);
+  if (p_.scales.refills() && p_.ports.ranks.any(shell_changed)) settle_bodies();  // granules stand elsewhere in them
   if (changes || p_.ports.ranks.any(shell_changed)) publish(c);
   follow_box();  // places of stored granules are rounded: the last digit of a border decides who owns what lies on it
   if (p_.handover.send_home()) count_restored();
@@ -461,6 +472,12 @@ void Culling::close_shell(bool changes, bool& shell_changed) {
   const auto timed = p_.report.time(Part::shell);
   if (changes || p_.census.something_stored()) p_.closure.share();
   if (p_.census.something_stored()) shell_changed |= p_.closure.fetch_what_is_near(open_for_insertion_) > 0;
+}
+
+/// What came out of a store that knows no places is packed; what it comes near to by that comes out, too.
+void Culling::refill(bool& shell_changed) {
+  if (!p_.scales.refills()) return;
+  while (p_.refill.pack()) close_shell(true, shell_changed);
 }
 
 /// And what nothing is near goes in.

@@ -93,6 +93,7 @@ class Culling {
   void open_for_insertion();
   void check_inserted();
   void close_shell(bool changes, bool& shell_changed);
+  void refill(bool& shell_changed);
   void store_and_fetch(const MembershipChange& c, bool changes, bool& shell_changed);
   void count_restored();
   void publish(const MembershipChange& c);
@@ -101,7 +102,7 @@ class Culling {
 
   CullingParts p_;
   Phase phase_ = Phase::between_runs;
-  Proposal proposal_;                // of the last look, until the next change
+  Proposal proposal_;  // of the last look, until the next change
   bool proposal_dropped_ = false;
   bool inner_pairs_listed_ = false;  // the neighbour lists are new: pairs within bodies stand in them
   bool open_for_insertion_ = false;  // a fix will insert: stored granules must make way in the next change

@@ -21,6 +21,7 @@
 #include "pacing.h"
 #include "parcels.h"
 #include "ports.h"
+#include "refill.h"
 #include "report.h"
 #include "scales.h"
 #include "shell.h"
@@ -72,6 +73,7 @@ struct CullingParts {
 
   // what changes it
   StoreExchange exchange;
+  Refill refill;
   ShellClosure closure;
   ContactFreezing freezing;
   Parcels parcels;

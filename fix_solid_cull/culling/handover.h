@@ -35,8 +35,10 @@ class Handover : public BodyFollower {
   void merged(int gone, int kept, bool same_frame) override;
   void frame_changed(int body) override { at_home_.erase(body); }
 
- private:
+  /// Stored granules whose places are another rank's, of bodies that have moved since the last time. Local.
   std::vector<std::int64_t> stored_elsewhere();
+
+ private:
   void leave(const std::vector<std::int64_t>& atoms, const std::vector<std::int64_t>& stored);
 
   const Ports& ports_;

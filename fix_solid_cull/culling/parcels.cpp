@@ -184,7 +184,7 @@ std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::s
         s.walls = static_cast<int>(in.whole());
         s.held = g.held;
         s.load_change = in.vector();
-        if (scales_.compact()) s.lock_step = std::min(s.lock_step, StoreExchange::locked_long_ago);
+        if (scales_.image_by_place()) s.lock_step = std::min(s.lock_step, StoreExchange::locked_long_ago);
         g.record = in.numbers(static_cast<std::size_t>(g.length));
       }
       p.granules.emplace(tag, g);

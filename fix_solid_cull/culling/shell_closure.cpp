@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "release.h"
+#include "site_choice.h"
 
 namespace solidcull {
 namespace {
@@ -35,7 +36,9 @@ void ShellClosure::merged(int gone, int kept, bool same_frame) {
 ShellClosure::Foreign ShellClosure::as_foreign(int i) const {
   const Locked& e = shell_[i];
   const bool in_body = e.in_body();  // else it has just been chosen
-  return {ports_.atoms.sphere(i), in_body ? groups_.key_of(e.body) : 0, in_body && solid_.stands(e.body)};
+  // bodies that stand do not touch what is stored in each other, but at sites
+  const bool stands = in_body && solid_.stands(e.body) && !scales_.refills();
+  return {ports_.atoms.sphere(i), in_body ? groups_.key_of(e.body) : 0, stands};
 }
 
 void ShellClosure::share() {
@@ -163,6 +166,7 @@ void ShellClosure::find_near_granules(std::set<std::int64_t>& near) {
         if (v.who.body == f.key || (f.stands && (v.who.stands || v.clear))) return true;
         const Vec3 at = f.pose->to_frame(s.centre + shift);
         solid_.store().for_each_near(f.number, {at, s.radius}, gap, [&](const Resident& g) {
+          if (v.who.body && groups_.key_of(g.body) == v.who.body) return;  // in the frame that bodies share
           const double reach = s.radius + g.radius + skin;
           if ((g.position - at).squaredNorm() < reach * reach) near.insert(g.tag);
           if (f.stands) v.atom = -1;
@@ -267,10 +271,11 @@ std::size_t ShellClosure::fetch_from_outside() {
 // ------------------------------------------------------------------------------------------------------------ into the store
 
 /// Walls do not hinder it from going to the store: there are none, or they and its body stand still, and what they do to it is
-/// known.
+/// known. What has no place presses on no wall: it stays.
 bool ShellClosure::may_leave_its_walls(int i) const {
   const AtWall& wall = walls_[i];
   if (!wall.near) return true;
+  if (scales_.refills()) return false;
   const Locked& e = shell_[i];
   return scales_.sleeping() && !wall.moving_near && solid_.stands(e.body) && e.came_back != ports_.run.step && !e.fresh &&
          !new_run_;
@@ -333,8 +338,10 @@ class ShellClosure::Surroundings {
     const std::vector<Box> counting = c.ports_.insertions.counting(c.solid_.store().largest_radius() + gap_);
     opened_.insert(opened_.end(), counting.begin(), counting.end());
   }
-  bool near(int i) const {
-    return exterior_.any_near(c_.ports_.atoms.sphere(i), gap_) || near_another_body(i) || is_open(c_.ports_.atoms.place(i));
+  bool near(int i) const { return near(i, c_.ports_.atoms.sphere(i)); }
+  /// The same if atom i was there.
+  bool near(int i, const Sphere& there) const {
+    return exterior_.any_near(there, gap_) || near_another_body(i, there) || is_open(there.centre);
   }
 
  private:
@@ -363,10 +370,9 @@ class ShellClosure::Surroundings {
       return (x.array() >= box.lo.array()).all() && (x.array() <= box.hi.array()).all();
     });
   }
-  bool near_another_body(int i) const {
+  bool near_another_body(int i, const Sphere& s) const {
     if (!c_.census_.several_bodies()) return false;
     const Foreign self = c_.as_foreign(i);
-    const Sphere& s = self.sphere;
     // bodies that both stand still may be as near as they like, but what they do to each other needs two atoms
     const auto touches = [&](const Sphere& other) {
       const double reach = c_.ports_.contacts.reach_factor * (s.radius + other.radius);
@@ -426,8 +432,27 @@ std::size_t ShellClosure::store_what_is_deep(bool locked_now, bool membership_ch
   leave_out_near_meshes(deep);
   // where nothing else changes, a few wait for more
   if (!membership_changes && static_cast<double>(deep.size()) < store_share * ports_.atoms.owned) return 0;
+  if (scales_.refills()) return put_away_at_sites(deep, surroundings);
   for (const int i : deep) exchange_.put_away(i);
   return deep.size();
+}
+
+/// Where no site will do they stay.
+std::size_t ShellClosure::put_away_at_sites(const std::vector<int>& deep, const Surroundings& surroundings) {
+  const double wall_gap = (wall_gap_in_skins + wall_check_in_skins) * ports_.run.skin;
+  const SiteChoice choice(ports_, scales_, solid_, shell_, deep, wall_gap, [&](int i, const Sphere& there) {
+    // where it would lie: through a periodic side others are near than beyond it
+    const Sphere in_box{ports_.run.wrapped(there.centre), there.radius};
+    return ports_.ranks.owns(in_box.centre) && !surroundings.near(i, in_box);
+  });
+  std::size_t went = 0;
+  for (std::size_t k = 0; k < deep.size(); ++k)
+    if (const auto site = choice.of(k)) {
+      exchange_.relocate(deep[k], *site);
+      exchange_.put_away(deep[k]);
+      ++went;
+    }
+  return went;
 }
 
 void ShellClosure::release_memory() { release(foreign_); }

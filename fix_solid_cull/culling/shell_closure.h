@@ -102,6 +102,7 @@ class ShellClosure : public BodyFollower {
   void find_near_primitives(const std::vector<int>& frames, std::set<std::int64_t>& near) const;
   bool may_leave_its_walls(int i) const;
   void leave_out_near_meshes(std::vector<int>& atoms) const;
+  std::size_t put_away_at_sites(const std::vector<int>& deep, const Surroundings& surroundings);
 
   const Ports& ports_;
   const Scales& scales_;

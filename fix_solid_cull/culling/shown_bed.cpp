@@ -58,7 +58,7 @@ void ShownBed::show_interface() {
 
 void ShownBed::show_stored() {
   Atoms& atoms = ports_.atoms;
-  const bool by_place = !ports_.run.any_periodic() || scales_.compact();
+  const bool by_place = !ports_.run.any_periodic() || scales_.image_by_place();
   const Vec3 middle = 0.5 * (ports_.run.box.lo + ports_.run.box.hi);
   motion_words_.clear();
   solid_.store().for_each_record([&](const StoredGranule& g, const std::vector<double>& record, bool transient_known) {
@@ -67,7 +67,7 @@ void ShownBed::show_stored() {
     if (!transient_known) {
       const SolidBody& body = solid_.bodies().body(g.body);
       const Vec3 x = body.pose.to_world(g.position);
-      atoms.set_place(i, solid_.nearest_image(x, scales_.compact() ? middle : atoms.place(i)));
+      atoms.set_place(i, solid_.nearest_image(x, scales_.image_by_place() ? middle : atoms.place(i)));
       atoms.set_velocity(i, body.twist.at(x));
       if (ports_.contacts.turn_granules) atoms.set_spin(i, body.twist.spin);
     }
@@ -192,7 +192,7 @@ void ShownBed::judge(std::size_t number, int i) {
     int layout = 0;
     atoms.pack(i, record_, layout);
     if (changed)
-      changes_[s.tag] = {false, layout, record_};
+      changes_[s.tag] = {false, atoms.place(i) != s.place, layout, record_};
     else if (sum_of(record_) != s.sum)
       solid_.set_record(s.tag, layout, record_, motion_words_);
   }
@@ -235,11 +235,13 @@ void ShownBed::give(int i, const Change& change) {
   });
   ports_.contacts.clear_histories(i);
   shell_.reset(i);
+  const Vec3 place = atoms.place(i);
   atoms.take_out(i);
   index_.erase(tag);
   if (i < atoms.owned) index_.set(atoms.tag[i], i);
   if (change.deleted) return;
   const int now = atoms.put_back(change.record, change.layout);
+  if (scales_.refills() && !change.moved) atoms.set_place(now, place);  // as it was packed when it woke
   atoms.mark_interface(now, false);
   ports_.contacts.clear_histories(now);
   std::vector<Contacts::History> contacts;

@@ -66,7 +66,7 @@ class ShownBed : public FollowsAtoms {
     Vec3 velocity, spin;  // that of its body
   };
   struct Change {
-    bool deleted = false;
+    bool deleted = false, moved = false;  // moved: by the deck
     int layout = 0;
     std::vector<double> record;
   };

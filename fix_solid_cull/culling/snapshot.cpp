@@ -12,7 +12,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261124;  // the format's version
+constexpr double file_mark = 20261125;  // the format's version
 /// The numbers before the ranks' parcels. A check sum follows them.
 enum Header {
   mark,
@@ -25,6 +25,7 @@ enum Header {
   width = counters + 4,
   ranks,
   step,
+  no_places,
   header_size
 };
 constexpr std::size_t check_sum_size = 2;
@@ -78,6 +79,7 @@ std::vector<double> Snapshot::write() {
   h[width] = static_cast<double>(solid_.contacts().width());
   h[ranks] = ports_.ranks.count;
   h[step] = static_cast<double>(ports_.run.step);
+  h[no_places] = scales_.refills();
   state.reserve(static_cast<std::size_t>(size));
   state.insert(state.end(), all.begin(), all.end());
   const auto sum = check_sum(state.data(), state.size());
@@ -128,6 +130,9 @@ void Snapshot::take_up() {
     throw InputError("the restart file holds contact histories of " + std::to_string(static_cast<int>(h[width])) +
                      " numbers and this deck's contact model has " + std::to_string(solid_.contacts().width()) +
                      ": use the contact model that the file was written with");
+  if ((h[no_places] != 0) != scales_.refills() && h[interior] > 0)
+    throw InputError(std::string("the restart file was written with 'store ") +
+                     (scales_.refills() ? "exact' or 'compact" : "none") + "': read it with that store");
   index_.index(ports_.atoms);
   const std::vector<Parcel> parcels = parcels_.unpack(h + header_size, state.size() - header_size, solid_.contacts().width());
   const bool same_ranks =

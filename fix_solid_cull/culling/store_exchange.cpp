@@ -22,14 +22,25 @@ int StoreExchange::bring_back(std::int64_t tag) {
   const SolidBody& body = solid_.bodies().body(g.body);
   const Vec3 x = body.pose.to_world(g.position);
   if (!still_there) {
-    const Vec3 near = scales_.compact() ? Vec3(0.5 * (ports_.run.box.lo + ports_.run.box.hi)) : atoms.place(i);
+    const Vec3 near = scales_.image_by_place() ? Vec3(0.5 * (ports_.run.box.lo + ports_.run.box.hi)) : atoms.place(i);
     atoms.set_place(i, solid_.nearest_image(x, near));
   }
   atoms.set_velocity(i, body.twist.at(x));
   if (ports_.contacts.turn_granules) atoms.set_spin(i, body.twist.spin);
   cover_.came_back(i, x);
   index_.set(tag, i);
+  if (scales_.refills()) came_back_.push_back(tag);
   return i;
+}
+
+void StoreExchange::relocate(int i, const Vec3& place) {
+  const Locked& e = shell_[i];
+  Atoms& atoms = ports_.atoms;
+  const Vec3 by = solid_.bodies().pose(e.body).turned_to_world(place - e.place);
+  solid_.count_refilled(-atoms.mass[i] * ports_.run.gravity().dot(by));
+  solid_.relocate(e.body, {atoms.mass[i], e.place, atoms.radius[i], e.held}, place);
+  shell_.stands(i, {e.body, place});
+  atoms.set_place(i, atoms.place(i) + by);
 }
 
 void StoreExchange::put_away(int i) {
@@ -40,7 +51,7 @@ void StoreExchange::put_away(int i) {
   if (turns) atoms.set_spin(i, e.spin);  // else it is its own, and goes on in the store
   stored_groups_ |= atoms.groups[i];
   ports_.contacts.clear_histories(i);
-  if (scales_.compact()) atoms.wrap(i);  // the box and the place tell which image: no word is kept for it
+  if (scales_.image_by_place()) atoms.wrap(i);  // the box and the place tell which image: no word is kept for it
   std::vector<double> record;
   StoredGranule g;
   atoms.pack(i, record, g.layout);
@@ -56,18 +67,23 @@ void StoreExchange::put_away(int i) {
   g.walls = walls_[i].touched;
   g.held = e.held;
   const std::int64_t now = ports_.run.step;
-  if (scales_.compact()) {
+  if (scales_.image_by_place()) {
     g = solid_.as_stored(g);
-    g.lock_step = e.lock_step == now ? locked_as_it_was_stored : locked_long_ago;
+    g.lock_step = e.lock_step == now && scales_.compact() ? locked_as_it_was_stored : locked_long_ago;
   }
   std::vector<WallLoad> loads;
   if (walls_[i].near && scales_.sleeping()) loads = grounding_.wall_loads_on(i);
   if (stored_at_ != now) {
     stored_at_ = now;
-    const bool places = !ports_.run.any_periodic() || scales_.compact();  // the place tells which image
+    const bool places = !ports_.run.any_periodic() || scales_.image_by_place();  // the place tells which image
     motion_words_ = atoms.motion_words(i, places, turns);
   }
-  solid_.put_away(g, record, motion_words_, loads);
+  if (scales_.refills()) {
+    for (const int word : motion_words_) record[static_cast<std::size_t>(word)] = 0;
+    solid_.put_away(g, record, {}, loads);
+  } else {
+    solid_.put_away(g, record, motion_words_, loads);
+  }
   index_.erase(g.tag);
   atoms.take_out(i);
   if (i < atoms.owned) index_.set(atoms.tag[i], i);

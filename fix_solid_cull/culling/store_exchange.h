@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "atom_index.h"
@@ -32,6 +33,11 @@ class StoreExchange {
   void put_away(int i);
   /// The granule is an interface granule again, where its body is; returns its index.
   int bring_back(std::int64_t tag);
+  /// Interface granule i stands elsewhere in its body from here on: place in the body's frame (m). It may have been unlocked in
+  /// this change.
+  void relocate(int i, const Vec3& place);
+  /// With `restore refill`: tags of what has come back since the last call.
+  std::vector<std::int64_t> take_what_came_back() { return std::exchange(came_back_, {}); }
   /// All engine groups, as bits, that a granule that went in is in; of what came out again too, until they are counted anew.
   /// Local.
   int stored_groups() const { return stored_groups_; }
@@ -40,7 +46,7 @@ class StoreExchange {
   /// Returns bytes that were freed.
   std::size_t begin_change();
 
-  // lock_step in a compact store, which needs to know no more
+  // lock_step in a compact store, and in one of no places, which need to know no more
   static constexpr std::int64_t locked_long_ago = -1, locked_as_it_was_stored = -2;
 
  private:
@@ -54,6 +60,7 @@ class StoreExchange {
   WallSurvey& walls_;
   Cover& cover_;
   const Grounding& grounding_;
+  std::vector<std::int64_t> came_back_;
   int stored_groups_ = 0;
   std::int64_t stored_at_ = never;  // step in which granules last went into the store
   std::vector<int> motion_words_;   // of a record: what is of no worth once that step has passed

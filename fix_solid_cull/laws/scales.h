@@ -39,6 +39,10 @@ class Scales {
   bool rigid() const { return settings_.motion == Motion::rigid; }
   bool sleeping() const { return settings_.exterior == Exterior::sleep; }
   bool compact() const { return settings_.store == Store::compact; }
+  /// No place of a stored granule is kept: what comes back is put into a new packing.
+  bool refills() const { return settings_.store == Store::none; }
+  /// The place of a stored granule is all that tells in which periodic image it is.
+  bool image_by_place() const { return compact() || refills(); }
   bool needs_surface() const { return settings_.exterior == Exterior::live; }
   double depth() const { return settings_.depth * diameter_; }  ///< m
   double voxel() const { return settings_.voxel * diameter_; }  ///< m

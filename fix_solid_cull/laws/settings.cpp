@@ -99,12 +99,14 @@ const std::map<std::string, Reader>& readers() {
        }},
       {"store",
        [](Values& v, Settings& s) {
-         v.one_of("'exact' or 'compact'",
-                  {{"exact", [&] { s.store = Store::exact; }}, {"compact", [&] { s.store = Store::compact; }}});
+         v.one_of("'exact', 'compact' or 'none'", {{"exact", [&] { s.store = Store::exact; }},
+                                                   {"compact", [&] { s.store = Store::compact; }},
+                                                   {"none", [&] { s.store = Store::none; }}});
        }},
       {"restore",
        [](Values& v, Settings& s) {
-         v.one_of("'exact'", {{"exact", [&] { s.restore = Restore::exact; }}});
+         v.one_of("'exact' or 'refill'",
+                  {{"exact", [&] { s.restore = Restore::exact; }}, {"refill", [&] { s.restore = Restore::refill; }}});
        }},
       {"voxel", [](Values& v, Settings& s) { s.voxel = v.number("a size in mean diameters, 0.1 to 2", 0.1, true, 2.0); }},
       {"mesh",
@@ -144,6 +146,11 @@ Settings parse_settings(const std::vector<std::string>& words) {
     at = values.end();
   }
   if (s.depth < 0) s.depth = s.exterior == Exterior::live ? 2.0 : 0.0;
+  if (s.store == Store::none && s.restore != Restore::refill)
+    throw InputError(
+        "keyword 'store' has the value 'none' and 'restore' the value 'exact': say 'restore refill', or store granules");
+  if (s.store != Store::none && s.restore == Restore::refill)
+    throw InputError("keyword 'restore' has the value 'refill' and 'store' keeps granules: say 'store none', or 'restore exact'");
   if (s.exterior == Exterior::live && s.depth == 0)
     throw InputError(
         "keyword 'depth' has the value '0' and 'exterior' the value 'live': give a cover of more than 0, or say "

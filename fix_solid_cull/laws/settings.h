@@ -9,8 +9,8 @@ namespace solidcull {
 enum class Exterior { live, sleep };
 enum class Motion { rigid, fixed };
 enum class WallCover { closed, surface };
-enum class Store { exact, compact };
-enum class Restore { exact };
+enum class Store { exact, compact, none };
+enum class Restore { exact, refill };
 
 /// A file every so many steps; a '*' in its name becomes the step.
 struct Output {

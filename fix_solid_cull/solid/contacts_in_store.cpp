@@ -4,8 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "solid_state.h"
-
 namespace solidcull {
 namespace {
 
@@ -29,24 +27,25 @@ void for_each_image(const Vec3& place, const Vec3& lo, const Vec3& hi, double re
 
 }  // namespace
 
-void contacts_in_store(const GranuleStore& store, const SolidBodies& bodies, std::int64_t tag,
+void contacts_in_store(const GranuleStore& store, const SolidBodies& bodies, std::int64_t tag, double gap,
                        std::vector<std::int64_t>& partners) {
   const auto found = store.find(tag);
   if (!found) return;
   const Resident& granule = *found;
   const int body = bodies.root(granule.body), frame = store.frame_of(granule.body);
-  const double gap = SolidStateLaw::gap * (granule.radius + store.largest_radius());
+  const double farthest = gap * (granule.radius + store.largest_radius());
   const auto look_around = [&](const Vec3& place) {
-    store.for_each_near(frame, {place, granule.radius}, gap, [&](const Resident& other) {
-      const double reach = (1 + SolidStateLaw::gap) * (granule.radius + other.radius);
+    store.for_each_near(frame, {place, granule.radius}, farthest, [&](const Resident& other) {
+      const double reach = (1 + gap) * (granule.radius + other.radius);
       if (other.tag == tag || (other.position - place).squaredNorm() > reach * reach || bodies.root(other.body) != body) return;
       if (std::find(partners.begin(), partners.end(), other.tag) == partners.end()) partners.push_back(other.tag);
     });
   };
   look_around(granule.position);
   if ((bodies.periods().array() > 0).any())
-    for_each_image(granule.position, store.lowest(frame), store.highest(frame), granule.radius + store.largest_radius() + gap,
-                   bodies.periods(), frame == GranuleStore::shared_frame ? Pose() : bodies.pose(granule.body),
+    for_each_image(granule.position, store.lowest(frame), store.highest(frame),
+                   granule.radius + store.largest_radius() + farthest, bodies.periods(),
+                   frame == GranuleStore::shared_frame ? Pose() : bodies.pose(granule.body),
                    [&](const Vec3& shift) { look_around(granule.position + shift); });
 }
 

@@ -9,10 +9,10 @@
 
 namespace solidcull {
 
-/// Adds to `partners`, each once, the stored granules of the same body whose centres are within 1 + SolidStateLaw::gap times the
-/// radii's sum of that of `tag`, through periodic sides too; none if `tag` is not in the store. A body does not change its
-/// shape, so the answer is the same for as long as both are stored. Costs O(neighbours). Local.
-void contacts_in_store(const GranuleStore& store, const SolidBodies& bodies, std::int64_t tag,
+/// Adds to `partners`, each once, the stored granules of the same body whose centres are within 1 + `gap` times the radii's sum
+/// of that of `tag`, through periodic sides too; none if `tag` is not in the store. A body does not change its shape, so the
+/// answer is the same for as long as both are stored. Costs O(neighbours). Local.
+void contacts_in_store(const GranuleStore& store, const SolidBodies& bodies, std::int64_t tag, double gap,
                        std::vector<std::int64_t>& partners);
 
 }  // namespace solidcull

@@ -107,6 +107,10 @@ class FrozenContacts {
     for (std::uint32_t e = first(tag); e != none; e = next(e, tag))
       if (edges_[e].has_history && mine(other(e, tag))) turn(histories_.row(e), by);
   }
+  /// The contacts of `tag` stay, without their histories.
+  void forget_histories(std::int64_t tag) {
+    for (std::uint32_t e = first(tag); e != none; e = next(e, tag)) edges_[e].has_history = false;
+  }
   /// Removes all contacts of `tag`.
   void erase(std::int64_t tag);
   /// Removes those with partners for which goes(partner) holds.

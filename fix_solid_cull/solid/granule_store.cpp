@@ -43,18 +43,33 @@ std::array<double, 4> numbers_of(std::uint64_t word) {
 constexpr double steps_per_cell = 1 << 26;  // of a rounded place
 static_assert(GranuleStore::farthest * steps_per_cell == FixedPlace::half);
 
+/// Of a place (32-bit words).
+int place_words(GranuleStore::Precision precision) {
+  switch (precision) {
+    case GranuleStore::Precision::rounded:
+      return FixedPlace::words;
+    case GranuleStore::Precision::sites:
+      return sizeof(Sites::Number) / sizeof(std::uint32_t);
+    default:
+      return sizeof(Vec3) / sizeof(std::uint32_t);
+  }
+}
+
 }  // namespace
 
 GranuleStore::GranuleStore(double cell, Precision precision)
     : inverse_cell_(1.0 / cell),
       step_(cell / steps_per_cell),
       precision_(precision),
-      slots_(place_field + (precision == Precision::rounded ? FixedPlace::words : sizeof(Vec3) / sizeof(std::uint32_t))) {
+      slots_(static_cast<std::size_t>(place_field + place_words(precision))) {
   if (!(cell > 0) || !std::isfinite(cell)) throw std::invalid_argument("granule store: the cell size must be positive");
 }
 
-Vec3 GranuleStore::rounded(const Vec3& place) const {
+GranuleStore::GranuleStore(double cell, const Sites& sites) : GranuleStore(cell, Precision::sites) { sites_ = &sites; }
+
+Vec3 GranuleStore::rounded(const Vec3& place, double radius) const {
   if (precision_ == Precision::exact) return place;
+  if (precision_ == Precision::sites) return sites_->place(sites_->nearest(place, radius));
   std::uint32_t packed[FixedPlace::words];
   FixedPlace::pack(place, step_, packed);
   return FixedPlace::unpack(packed, step_);
@@ -62,7 +77,8 @@ Vec3 GranuleStore::rounded(const Vec3& place) const {
 
 StoredGranule GranuleStore::rounded(StoredGranule granule) const {
   if (precision_ == Precision::exact) return granule;
-  granule.position = rounded(granule.position);
+  granule.position = rounded(granule.position, granule.radius);
+  if (precision_ == Precision::sites) granule.load_change = Vec3::Zero();
   const auto rounded =
       numbers_of(word_of({granule.normal_load, granule.load_change[0], granule.load_change[1], granule.load_change[2]}));
   granule.normal_load = rounded[0];
@@ -92,7 +108,7 @@ void GranuleStore::add(const StoredGranule& granule, const double* record, int l
     if (i < 0 || i >= length)
       throw std::logic_error("a record of " + std::to_string(length) + " has no word " + std::to_string(i));
 
-  const Vec3 place = rounded(granule.position);
+  const Vec3 place = rounded(granule.position, granule.radius);
   int s = first_free_;
   if (s == none)
     s = static_cast<int>(slots_.append());
@@ -115,7 +131,7 @@ void GranuleStore::add(const StoredGranule& granule, const double* record, int l
     }
   }
 
-  set_position(s, place);
+  set_position(s, place, granule.radius);
   set_field(s, tag_field, tag);
   set_field(s, body_field, granule.body);
   set_row(s, rows_.put(row.data(), static_cast<int>(row.size())));
@@ -254,6 +270,14 @@ int GranuleStore::frame_of(int body) const {
   return found != bodies_.end() && found->second.shared ? shared_frame : body;
 }
 
+bool GranuleStore::is_taken(int frame, const Vec3& site) const {
+  const auto grid = grids_.find(frame);
+  bool taken = false;
+  if (grid != grids_.end())
+    for_each_slot_in_box(grid->second, site, site, [&](int slot) { taken = taken || position(slot) == site; });
+  return taken;
+}
+
 std::vector<int> GranuleStore::slots_of(int body) const {
   std::vector<int> slots;
   for_each_slot_of(body, [&](int s) { slots.push_back(s); });
@@ -315,13 +339,14 @@ void GranuleStore::leave(int body) {
 }
 
 void GranuleStore::relocate(int s, int body, const Vec3& place) {
-  const Vec3 to = rounded(place);
+  const double radius = precision_ == Precision::sites ? resident(s).radius : 0;  // else it does not matter
+  const Vec3 to = rounded(place, radius);
   const int from = body_at(s);
   const int old_frame = frame_of(from), new_frame = frame_of(body);
   const bool same_cell = old_frame == new_frame && cell_of(position(s)) == cell_of(to);
   if (!same_cell) unseat(s, old_frame);
   set_field(s, body_field, body);
-  set_position(s, to);
+  set_position(s, to, radius);
   if (same_cell)
     grids_.find(new_frame)->second.box.enclose(to);
   else

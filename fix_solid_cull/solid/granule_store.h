@@ -15,6 +15,7 @@
 #include "few_bits.h"
 #include "flat_map.h"
 #include "packed_rows.h"
+#include "sites.h"
 #include "sphere.h"
 
 namespace solidcull {
@@ -51,13 +52,25 @@ class GranuleStore {
   static constexpr int shared_frame = 0;  ///< that of all bodies that share(); any other frame has the number of its body
 
   /// All comes back to the bit; or normal_load and load_change are rounded to 0.2 %, and places to 2^-27 of the search cells'
-  /// edge, as by rounded(). A place more than 32,768 cells from the origin of its frame is a std::range_error then.
-  enum class Precision { exact, rounded };
+  /// edge, as by rounded(). A place more than 32,768 cells from the origin of its frame is a std::range_error then. Or no place
+  /// is kept but the number of the nearest site, and of the loads normal_load alone.
+  enum class Precision { exact, rounded, sites };
   static constexpr double farthest = 32768;  ///< cells
   StoredGranule rounded(StoredGranule granule) const;
 
   /// cell: edge of the search cells in m; best near the largest contact distance. Throws std::invalid_argument if not > 0.
   explicit GranuleStore(double cell, Precision precision = Precision::exact);
+  /// One that keeps sites; they outlive it.
+  GranuleStore(double cell, const Sites& sites);
+
+  /// The nearest site to a place in this body's frame that no granule here has, those around it that suits(place) rejects left
+  /// out; nothing if there is none within `reach` diameters of the lattice. Only of a store that keeps sites.
+  template <class Suits>
+  std::optional<Vec3> free_site(int body, const Vec3& place, double radius, double reach, Suits suits) const {
+    for (const Vec3& site : sites_->around(place, radius, reach))
+      if (!is_taken(frame_of(body), site) && suits(site)) return site;
+    return std::nullopt;
+  }
 
   /// Takes a granule in. A tag that is in the store already, or that is no 32-bit number, is a std::logic_error. The words of
   /// the record at the indices `transient` are kept until forget_transient() and are 0.0 afterwards.
@@ -187,14 +200,14 @@ class GranuleStore {
   /// words.
   static constexpr int record_begin = 10;
   using Head = std::array<std::uint64_t, record_begin>;
-  /// The words of a slot: 44 or 36 bytes.
+  /// The words of a slot: 44, 36 or 28 bytes.
   enum Field {
     tag_field,
     next_field,  // next granule in the cell, or next free slot
     body_field,
     shape_field,  // with blob_field: the row, everything else
     blob_field,
-    place_field  // the bits of three doubles, or as FixedPlace packs them
+    place_field  // the bits of three doubles, or as FixedPlace packs them, or the number of a site
   };
   struct Cell {
     int head = none;
@@ -300,21 +313,31 @@ class GranuleStore {
   Vec3 position(int s) const {
     const std::uint32_t* place = slots_.row(static_cast<std::size_t>(s)) + place_field;
     if (precision_ == Precision::rounded) return FixedPlace::unpack(place, step_);
+    if (precision_ == Precision::sites) {
+      Sites::Number site;
+      std::memcpy(&site, place, sizeof site);
+      return sites_->place(site);
+    }
     Vec3 p;
     std::memcpy(p.data(), place, sizeof p);
     return p;
   }
-  void set_position(int s, const Vec3& p) {
+  void set_position(int s, const Vec3& p, double radius) {
     std::uint32_t* place = slots_.row(static_cast<std::size_t>(s)) + place_field;
-    if (precision_ == Precision::rounded)
-      FixedPlace::pack(p, step_, place);
-    else
+    if (precision_ == Precision::exact) {
       std::memcpy(place, p.data(), sizeof p);
+    } else if (precision_ == Precision::rounded) {
+      FixedPlace::pack(p, step_, place);
+    } else {
+      const Sites::Number site = sites_->nearest(p, radius);
+      std::memcpy(place, &site, sizeof site);
+    }
   }
+  bool is_taken(int frame, const Vec3& site) const;
   Resident resident(int s) const;
   Head head_of_row(const StoredGranule& g, std::size_t tail) const;
   std::vector<std::uint64_t> row_of(int s) const;
-  Vec3 rounded(const Vec3& place) const;
+  Vec3 rounded(const Vec3& place, double radius) const;
   static std::size_t tail_of(const std::vector<std::uint64_t>& row) { return row[record_begin - 1] >> 33; }
   StoredGranule granule(int s) const;
   void read_record(int s, std::vector<double>& out) const;
@@ -337,6 +360,7 @@ class GranuleStore {
 
   double inverse_cell_, step_;
   Precision precision_;
+  const Sites* sites_ = nullptr;
   double largest_radius_ = 0;
   std::size_t size_ = 0;
   ExactSum mass_;

@@ -28,6 +28,8 @@ class Ledger {
     ++restored_;
     energy_ += energy;
   }
+  /// What a granule gained in height and by overlaps because it was given another place (J).
+  void refilled(double energy) { energy_ += energy; }
   void carved() { ++carves_; }
 
   /// What the books say should be in the store, against what is there. Exact but for rounding.

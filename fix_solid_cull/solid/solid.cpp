@@ -5,19 +5,36 @@
 #include <set>
 
 #include "contacts_in_store.h"
+#include "solid_state.h"
 
 namespace solidcull {
+namespace {
+
+// what is no farther apart in a store that keeps sites hangs together there
+constexpr double gap_between_sites = 0.3;  // of the radii's sum
+// how far a free site is looked for: at first, and in the end (diameters)
+constexpr double near_site = 1.5, far_site = 50;
+constexpr double at_a_site = 1e-6;  // radii
+
+}  // namespace
 
 // ------------------------------------------------------------------------------------------------------------ the deck
 
 void Solid::open_store() {
-  const bool compact = scales_.compact();
-  store_ = std::make_unique<GranuleStore>(2 * scales_.diameter(),
-                                          compact ? GranuleStore::Precision::rounded : GranuleStore::Precision::exact);
+  const double cell = 2 * scales_.diameter();
+  if (scales_.refills()) {
+    sites_ = std::make_unique<Sites>(scales_.diameter());
+    store_ = std::make_unique<GranuleStore>(cell, *sites_);
+  } else {
+    store_ = std::make_unique<GranuleStore>(
+        cell, scales_.compact() ? GranuleStore::Precision::rounded : GranuleStore::Precision::exact);
+  }
   bodies_.set_elsewhere([this](std::int64_t tag) { return store_->body_of(tag); });
-  if (!compact) return;
-  contacts_.set_elsewhere(
-      [this](std::int64_t tag, std::vector<std::int64_t>& partners) { contacts_in_store(*store_, bodies_, tag, partners); });
+  if (!scales_.compact() && !scales_.refills()) return;
+  const double gap = scales_.refills() ? gap_between_sites : SolidStateLaw::gap;
+  contacts_.set_elsewhere([this, gap](std::int64_t tag, std::vector<std::int64_t>& partners) {
+    contacts_in_store(*store_, bodies_, tag, gap, partners);
+  });
 }
 
 bool Solid::set_histories(const std::vector<bool>& flips, const std::vector<int>& vectors) {
@@ -111,12 +128,23 @@ std::vector<Solid::Merge> Solid::adopt_swallowed() {
     if (scales_.compact() && !same) turn_inner_histories(gone.first, turn);
     if (store_->holds(gone.first) && store_->frame_of(gone.first) != GranuleStore::shared_frame)
       ++standing_version_;  // its granules may stand from now on
+    std::vector<std::int64_t> moved;
+    if (scales_.refills() && !same) {
+      store_->for_each_of_body(gone.first, [&](const Resident& g) { moved.push_back(g.tag); });
+      for (const std::int64_t tag : moved)
+        contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { contacts_.add(tag, partner, nullptr); });
+    }
     store_->merge(gone.first, body, [&](StoredGranule& g) {
       if (same) return;
       g.position = to.to_frame(from.to_world(g.position));
       g.load_change = turn * g.load_change;
       turn_contacts(g.tag, turn);
+      if (!scales_.refills()) return;
+      const Vec3 site = free_site(body, g.position, g.radius);
+      bodies_.relocate(body, {g.mass, g.position, g.radius, g.held}, site);
+      g.position = site;
     });
+    for (const std::int64_t tag : moved) drop_what_sites_tell(tag);
     wall_loads_.merge(gone.first, body);
     tell([&](BodyFollower& f) { f.merged(gone.first, body, same); });
     if (scales_.sleeping()) find_grid(body);
@@ -200,9 +228,13 @@ void Solid::turn_inner_histories(int body, const Eigen::Matrix3d& by) {
 // ------------------------------------------------------------------------------------------------------------ the store
 
 /// The store says itself which body a granule is in; a compact one also what it touches there, and of the histories of those
-/// contacts few bits are kept.
+/// contacts few bits are kept. With `store none` none is kept, and what is near is as good as touching.
 void Solid::entered_store(std::int64_t tag) {
   bodies_.leave(tag);
+  if (scales_.refills()) {
+    contacts_.forget_histories(tag);
+    drop_what_sites_tell(tag);
+  }
   if (!scales_.compact()) return;
   const Resident g = *store_->find(tag);
   std::vector<std::int64_t> partners;
@@ -219,9 +251,17 @@ void Solid::entered_store(std::int64_t tag) {
   contacts_.drop(tag, [&](std::int64_t partner) { return store_->contains(partner); });
 }
 
+/// What touched and has sites farther apart still hangs together: that stays in the graph.
+void Solid::drop_what_sites_tell(std::int64_t tag) {
+  std::vector<std::int64_t> told;
+  contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { told.push_back(partner); });
+  contacts_.drop(tag, [&](std::int64_t partner) { return std::find(told.begin(), told.end(), partner) != told.end(); });
+}
+
 void Solid::leaves_store(std::int64_t tag) {
   const Resident g = *store_->find(tag);
   bodies_.take_in(tag, g.body);
+  if (scales_.refills()) contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { contacts_.add(tag, partner, nullptr); });
   if (!scales_.compact()) return;
   std::vector<double> history(contacts_.width());
   std::vector<std::uint64_t> tail;
@@ -235,7 +275,23 @@ void Solid::leaves_store(std::int64_t tag) {
   });
 }
 
+/// Where a granule must go, however far that is. What is at a site already stays, taken or not: it may come from another rank.
+/// Where all is taken, two share a site.
+Vec3 Solid::free_site(int body, const Vec3& place, double radius) const {
+  const Vec3 nearest = sites_->place(sites_->nearest(place, radius));
+  if ((nearest - place).norm() < at_a_site * radius) return nearest;
+  for (double reach = near_site; reach < far_site; reach *= 2)
+    if (const auto site = store_->free_site(body, place, radius, reach, [](const Vec3&) { return true; })) return *site;
+  return nearest;
+}
+
 StoredGranule Solid::as_stored(const StoredGranule& g) {
+  if (scales_.refills()) {
+    StoredGranule at_site = g;
+    at_site.position = free_site(g.body, g.position, g.radius);
+    bodies_.relocate(g.body, {g.mass, g.position, g.radius, g.held}, at_site.position);
+    return store_->rounded(at_site);
+  }
   const StoredGranule kept = store_->rounded(g);
   // else many small ways add up when they leave
   if (scales_.compact()) bodies_.shift(g.body, {g.mass, g.position, g.radius, g.held}, kept.position);

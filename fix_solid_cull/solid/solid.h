@@ -13,6 +13,7 @@
 #include "ledger.h"
 #include "packed_history.h"
 #include "scales.h"
+#include "sites.h"
 #include "solid_bodies.h"
 
 namespace solidcull {
@@ -131,8 +132,10 @@ class Solid {
   void leave_rank(std::int64_t tag);
 
   // --- the store
-  /// g as the store will hold it; what it moves by then is told to its body.
+  /// g as the store will hold it; what it moves by then is told to its body. With `store none` it takes the nearest free site.
   StoredGranule as_stored(const StoredGranule& g);
+  /// An interface granule stands elsewhere in its body from here on (frame of the body).
+  void relocate(int body, const GranuleMass& granule, const Vec3& to) { bodies_.relocate(body, granule, to); }
   void put_away(const StoredGranule& g, const std::vector<double>& record, const std::vector<int>& transient,
                 const std::vector<WallLoad>& loads);
   /// It leaves the store and is an interface granule of its body again; `record` receives its engine record.
@@ -157,6 +160,7 @@ class Solid {
   // --- the ledger
   void count_locked() { ledger_.locked(); }
   void count_restored(double energy) { ledger_.restored(energy); }
+  void count_refilled(double energy) { ledger_.refilled(energy); }
   void count_carves(std::size_t n) {
     for (; n > 0; --n) ledger_.carved();
   }
@@ -167,9 +171,11 @@ class Solid {
   std::size_t memory_bytes() const;
 
  private:
+  Vec3 free_site(int body, const Vec3& place, double radius) const;
   void find_grid(int body);
   void entered_store(std::int64_t tag);
   void leaves_store(std::int64_t tag);
+  void drop_what_sites_tell(std::int64_t tag);
   Vec3 apart(const Resident& a, const Resident& b) const;
   void turn_inner_histories(int body, const Eigen::Matrix3d& by);
   template <class Tell>
@@ -179,6 +185,7 @@ class Solid {
 
   const Scales& scales_;
   std::vector<BodyFollower*> followers_;
+  std::unique_ptr<Sites> sites_;  // `store none`
   std::unique_ptr<GranuleStore> store_;
   FrozenContacts contacts_;
   PackedHistory packed_;  // of contacts in a compact store: in the tail of the granule that went in later

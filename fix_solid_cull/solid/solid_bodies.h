@@ -194,6 +194,15 @@ class SolidBodies {
     sums.add(granule.mass, granule.position, radius, -1, granule.held);
   }
 
+  /// The same by any way: the body's centre keeps its velocity, and the body its spin. Its motion is to be settled.
+  void relocate(int body, const GranuleMass& granule, const Vec3& to) {
+    SolidBody& b = this->body(body);
+    const Vec3 velocity = b.twist.at(b.pose.to_world(b.mass.centre()));
+    shift(body, granule, to);
+    b.twist = {b.pose.to_world(b.mass.centre()), velocity, b.twist.spin};
+    b.changed = true;
+  }
+
   /// A body as it was (from a restart file), and a granule that was in it. Returns its number.
   int found(const SolidBody& body);
   void take_in(std::int64_t tag, int body) { member_[narrow_tag(tag)] = body; }

@@ -28,8 +28,9 @@ struct Packing {
 
   explicit Packing(double cell) : store(cell, GranuleStore::Precision::rounded) {
     contacts.set_layout(std::vector<bool>(6, true));
-    contacts.set_elsewhere(
-        [this](std::int64_t tag, std::vector<std::int64_t>& partners) { contacts_in_store(store, bodies, tag, partners); });
+    contacts.set_elsewhere([this](std::int64_t tag, std::vector<std::int64_t>& partners) {
+      contacts_in_store(store, bodies, tag, SolidStateLaw::gap, partners);
+    });
     bodies.set_elsewhere([this](std::int64_t tag) { return store.body_of(tag); });
   }
   Packing(const Packing&) = delete;

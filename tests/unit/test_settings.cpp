@@ -117,6 +117,13 @@ TEST(Settings, bodies_move_unless_they_are_fixed) {
   EXPECT_EQ(parsed("motion fixed motion rigid").motion, Motion::rigid);
 }
 
+TEST(Settings, what_is_not_stored_is_refilled) {
+  for (const char* line : {"store none restore refill", "restore refill store none"}) {
+    EXPECT_EQ(parsed(line).store, Store::none);
+    EXPECT_EQ(parsed(line).restore, Restore::refill);
+  }
+}
+
 TEST(Settings, the_store_is_exact_or_compact) {
   EXPECT_EQ(parsed("store exact").store, Store::exact);
   EXPECT_EQ(parsed("store compact").store, Store::compact);
@@ -224,10 +231,14 @@ const Refusal refusals[] = {
     {"motion", "keyword 'motion' ends too early: give 'rigid' or 'fixed'"},
     {"walls open", "keyword 'walls' has the value 'open': give 'closed' or 'surface'"},
     {"walls", "keyword 'walls' ends too early: give 'closed' or 'surface'"},
-    {"store none", "keyword 'store' has the value 'none': give 'exact' or 'compact'"},
-    {"store", "keyword 'store' ends too early: give 'exact' or 'compact'"},
-    {"restore refill", "keyword 'restore' has the value 'refill': give 'exact'"},
-    {"restore", "keyword 'restore' ends too early: give 'exact'"},
+    {"store some", "keyword 'store' has the value 'some': give 'exact', 'compact' or 'none'"},
+    {"store", "keyword 'store' ends too early: give 'exact', 'compact' or 'none'"},
+    {"store none",
+     "keyword 'store' has the value 'none' and 'restore' the value 'exact': say 'restore refill', or store granules"},
+    {"restore new", "keyword 'restore' has the value 'new': give 'exact' or 'refill'"},
+    {"restore", "keyword 'restore' ends too early: give 'exact' or 'refill'"},
+    {"restore refill",
+     "keyword 'restore' has the value 'refill' and 'store' keeps granules: say 'store none', or 'restore exact'"},
 
     {"voxel 0.09", "keyword 'voxel' has the value '0.09': give a size in mean diameters, 0.1 to 2"},
     {"voxel 2.1", "keyword 'voxel' has the value '2.1': give a size in mean diameters, 0.1 to 2"},
