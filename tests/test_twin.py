@@ -504,7 +504,7 @@ class Drivers(unittest.TestCase):
         for driver in self.DRIVERS:
             with self.subTest(driver=driver):
                 # of few steps, so that beds of a user's own runs stay as they are
-                scene = ["tilt"] if "motion" in driver else ["gas"] if "activity" in driver else ["heavy"] if "stress" in driver else []
+                scene = ["slide"] if "motion" in driver else ["pour"] if "activity" in driver else ["heavy"] if "stress" in driver else []
                 done = subprocess.run(["/usr/bin/python3", str(ROOT / driver), "--few-steps", *scene], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                       stderr=subprocess.PIPE, text=True, timeout=100, env={**os.environ, engine.NAMED_BY: "/nowhere/liggghts-solidcull"})
                 self.assertEqual(done.returncode, 2, done.stderr)

@@ -17,12 +17,15 @@ void on_signal(int number, void (*handler)(int)) {
 }
 
 /// Open MPI starts a daemon for each program that mpirun did not start, so that it could start others (MPI_Comm_spawn). LIGGGHTS
-/// never does, and on a busy machine the daemon may fail to start, and the run with it. Other MPIs do not read this, and what the
-/// user has set stays.
+/// never does, and on a busy machine the daemon may fail to start, and the run with it. Without one all such programs share a folder
+/// for sockets, which one rank has no use for; one that ends takes it away from one that starts, whose MPI_Init then fails. Other
+/// MPIs do not read this, and what the user has set stays.
 void without_a_daemon() {
   const bool by_mpirun = getenv("OMPI_COMM_WORLD_SIZE") || getenv("PMIX_RANK");
   const int keep = 0;
-  if (!by_mpirun) setenv("OMPI_MCA_ess_singleton_isolated", "1", keep);
+  if (by_mpirun) return;
+  setenv("OMPI_MCA_ess_singleton_isolated", "1", keep);
+  setenv("OMPI_MCA_orte_create_session_dirs", "0", keep);
 }
 
 }  // namespace

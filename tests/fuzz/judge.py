@@ -82,7 +82,8 @@ def run(deck, culled, program, folder, ranks=None):
         (folder / f"deck{f}.in").write_text(deck.text(f, culled))
         n = ranks or deck.ranks[f]
         command = [str(program), "-in", f"deck{f}.in", "-log", f"log{f}", "-screen", f"screen{f}"]
-        end.status, end.late, out = run_file((["mpirun", "-np", str(n)] if n > 1 else []) + command, folder, env)
+        end.status, end.late, out = run_file((["mpirun", "-np", str(n)] if n > 1 else []) + command, folder,
+                                             {**env, **({"OMPI_MCA_orte_create_session_dirs": "0"} if n == 1 else {})})
         (folder / f"output{f}").write_text(out)
         log = folder / f"log{f}"
         screen = folder / f"screen{f}"

@@ -17,9 +17,11 @@ POLL = 0.02                      # s between two looks at a process
 PATIENCE = 5                     # s that a process is given to stop
 
 
-def environment():
+def environment(ranks=1):
     """Open MPI as root, in a container or bare root, or without mpirun, says nothing and does its work."""
     env = dict(os.environ)
+    if ranks == 1:  # programs on one rank share a folder, and one that ends takes it from one that starts
+        env.setdefault("OMPI_MCA_orte_create_session_dirs", "0")
     for name, value in {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1",
                         "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OMPI_MCA_ess_singleton_isolated": "1",
                         "OMPI_MCA_plm_rsh_agent": ""}.items():
@@ -75,7 +77,7 @@ class Process:
         self.wall = self.cpu = None  # s: from start to end, and of processors, once it has ended
         self.began = time.monotonic()
         with open(screen or log, "w") as f:
-            self.child = subprocess.Popen(command, cwd=folder, env=environment(), stdin=subprocess.DEVNULL, stdout=f,
+            self.child = subprocess.Popen(command, cwd=folder, env=environment(ranks), stdin=subprocess.DEVNULL, stdout=f,
                                           stderr=subprocess.STDOUT)
         self.waiter = threading.Thread(target=self.note_the_end, daemon=True)  # knows when, whatever this process is at
         self.waiter.start()
