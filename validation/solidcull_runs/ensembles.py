@@ -224,7 +224,8 @@ def result_of(case, done):
             if job.scene != scene:
                 continue
             if isinstance(run, str):
-                result["failed"].append({"run": job.name, "point": job.point.name, "why": run})
+                why = re.sub(r" \(all of it: .*\)$", "", run)  # a log of this machine is no part of a result
+                result["failed"].append({"run": job.name, "point": job.point.name, "why": why})
                 continue
             p = job.point
             entry = of_scene.setdefault(p.name, {"family": p.family, "absolute": p.absolute, "share": p.share, "default": p.default, "runs": []})
