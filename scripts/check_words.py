@@ -16,7 +16,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = ("README.md", "ARCHITECTURE.md", "tests/golden/README.md", "tests/fuzz/README.md", "fix_solid_cull/**/*.md", "region_interface_mesh/*.md", "benchmarks/README.md", "examples/**/*.md",
          "validation/**/*.md")
-MADE = {"out", "build"}  # folders of what runs leave
+MADE = {"out", "build", "report"}  # folders of what runs leave
 MOST_WORDS = 25
 MOST_LINES = {"README.md": 100}  # of the file in the root
 ABBREVIATIONS = {"e.g.", "i.e.", "al.", "cf.", "vs.", "approx.", "eq.", "fig.", "no.", "resp."}

@@ -15,7 +15,7 @@ TIME_LIMIT = 60  # s for one deck
 
 MPI = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_plm_rsh_agent": "",
        "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMP_NUM_THREADS": "1",
-       "OMPI_MCA_ess_singleton_isolated": "1"}
+       "OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_pml": "ob1"}
 NO_FOLDER = {"OMPI_MCA_orte_create_session_dirs": "0"}  # for one rank without mpirun: programs that end take it from those that start
 
 HERTZ = "gran model hertz tangential history"

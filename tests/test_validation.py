@@ -111,7 +111,7 @@ class Points(unittest.TestCase):
         for size in cases.SIZES:
             of_size = points.points(size)
             self.assertEqual(len({p.name for p in of_size}), len(of_size))
-            self.assertEqual(points.runs_of(of_size[0], size), 5)
+            self.assertEqual(points.runs_of(of_size[0]), 5)
             self.assertEqual({p.family for p in of_size}, set(points.FAMILIES))
             self.assertEqual([p.name for p in of_size if p.default], ["unculled", "sleep 3 0", "live 3 0"])
 

@@ -16,16 +16,19 @@ void on_signal(int number, void (*handler)(int)) {
   sigaction(number, &action, nullptr);
 }
 
-/// Open MPI starts a daemon for each program that mpirun did not start, so that it could start others (MPI_Comm_spawn). LIGGGHTS
+/// Open MPI starts a daemon for each program that neither mpirun nor a batch system started, so that it could start others (MPI_Comm_spawn). LIGGGHTS
 /// never does, and on a busy machine the daemon may fail to start, and the run with it. Without one all such programs share a folder
-/// for sockets, which one rank has no use for; one that ends takes it away from one that starts, whose MPI_Init then fails. Other
-/// MPIs do not read this, and what the user has set stays.
-void without_a_daemon() {
-  const bool by_mpirun = getenv("OMPI_COMM_WORLD_SIZE") || getenv("PMIX_RANK");
+/// for sockets, which one rank has no use for; one that ends takes it away from one that starts, whose MPI_Init then fails. Nor does
+/// one rank need a network, whose drivers take 0.2 s to measure the processor's clock. Other MPIs do not read this, and what the user
+/// has set stays.
+void alone() {
+  for (const char* started_by : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"}) {
+    if (getenv(started_by)) return;
+  }
   const int keep = 0;
-  if (by_mpirun) return;
   setenv("OMPI_MCA_ess_singleton_isolated", "1", keep);
   setenv("OMPI_MCA_orte_create_session_dirs", "0", keep);
+  setenv("OMPI_MCA_pml", "ob1", keep);
 }
 
 }  // namespace
@@ -34,7 +37,7 @@ int main(int argc, char** argv) {
   on_signal(SIGINT, LAMMPS_NS::SignalHandler::int_handler);
   on_signal(SIGTERM, LAMMPS_NS::SignalHandler::int_handler);  // mpirun turns SIGINT into SIGTERM
   on_signal(SIGUSR1, LAMMPS_NS::SignalHandler::usr1_handler);
-  without_a_daemon();
+  alone();
   MPI_Init(&argc, &argv);
   auto* lmp = new LAMMPS_NS::LAMMPS(argc, argv, MPI_COMM_WORLD);
   solidcull_register(lmp);

@@ -24,7 +24,7 @@ def environment(ranks=1):
         env.setdefault("OMPI_MCA_orte_create_session_dirs", "0")
     for name, value in {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1",
                         "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OMPI_MCA_ess_singleton_isolated": "1",
-                        "OMPI_MCA_plm_rsh_agent": ""}.items():
+                        "OMPI_MCA_plm_rsh_agent": "", "OMPI_MCA_pml": "ob1"}.items():
         env.setdefault(name, value)
     return env
 
@@ -61,6 +61,15 @@ def ending(status):
     return f"stopped with status {status}"
 
 
+RUNNING = set()  # the processes at work
+
+
+def stop_all():
+    """Ends every process at work, whichever thread waits for it."""
+    for process in list(RUNNING):
+        process.stop()
+
+
 class Process:
     """A LIGGGHTS at work on a deck. What it prints is in the file `log`; with `screen`, LIGGGHTS itself writes the log, which is
     then up to date wherever the deck says `flush yes`, and what it prints is in the file `screen`."""
@@ -79,6 +88,7 @@ class Process:
         with open(screen or log, "w") as f:
             self.child = subprocess.Popen(command, cwd=folder, env=environment(ranks), stdin=subprocess.DEVNULL, stdout=f,
                                           stderr=subprocess.STDOUT)
+        RUNNING.add(self)
         self.waiter = threading.Thread(target=self.note_the_end, daemon=True)  # knows when, whatever this process is at
         self.waiter.start()
 
@@ -86,6 +96,7 @@ class Process:
         _, status, used = os.wait4(self.child.pid, 0)
         self.wall, self.cpu = time.monotonic() - self.began, used.ru_utime + used.ru_stime
         self.child.returncode = os.waitstatus_to_exitcode(status)
+        RUNNING.discard(self)
 
     def ended(self):
         """Whether it has ended; then `wall` and `cpu` are known."""

@@ -10,7 +10,7 @@ import numpy as np
 from . import decks, dumps, fields
 from .beds import settled
 from .cases import short_hash
-from .engine import POLL, hash_of_fix
+from .engine import POLL, hash_of_fix, stop_all
 from .errors import RunError
 from .logs import FROM_HERE
 from .points import BY_HAND, PAPER, UNCULLED, points, runs_of
@@ -93,13 +93,13 @@ class Course:
 
 
 def files_of(case, scene, out):
-    """Makes the case's own files for a scene; the variable that names their folder."""
+    """Makes the case's own files for a scene; the variables that name their folder, `folder` in decks of examples."""
     v = case.variables(scene)
     folder = out / case.name / "files" / short_hash(v)
     folder.mkdir(parents=True, exist_ok=True)
     if case.get("files"):
         case.get("files")(folder, v)
-    return {"files": folder}
+    return {"files": folder, "folder": folder}
 
 
 def make_beds(cases, out, at_once, say):
@@ -118,8 +118,13 @@ def make_beds(cases, out, at_once, say):
         sources = sorted({*deck.parent.glob("*.in"), *(deck.parent.parent.parent / "shared").glob("*.in")} - {deck})
         return settled(file, deck, sources, variables, say=lambda line: say(line.strip()))
     with concurrent.futures.ThreadPoolExecutor(at_once) as pool:
-        for made in [pool.submit(make, file, *bed) for file, bed in wanted.items()]:
-            made.result()
+        try:
+            for made in [pool.submit(make, file, *bed) for file, bed in wanted.items()]:
+                made.result()
+        except BaseException:  # one failed, or the user stops: the others are not waited for
+            pool.shutdown(wait=False, cancel_futures=True)
+            stop_all()
+            raise
     return files
 
 
@@ -134,9 +139,9 @@ def jobs_of(case, out, beds, launcher, fix, only=None):
         texts.append(bed.with_suffix(".recipe").read_text() if bed else "")
         main = scene == case.main_scene
         wanted = [p for p in points(case.size) if (p.default or main) and (p.family != BY_HAND or case.get("by_hand"))]
-        for k in range(max(runs_of(p, case.size, main) for p in wanted)):
+        for k in range(max(runs_of(p, main) for p in wanted)):
             for p in wanted:
-                if k >= runs_of(p, case.size, main) or (only and (p.name not in only[0] or k >= only[1])):
+                if k >= runs_of(p, main) or (only and (p.name not in only[0] or k >= only[1])):
                     continue
                 frames = v.get("frames", FRAMES) if k == 0 and p.default and main else 0
                 aside = {case.need("aside"): ASIDE[k]}
@@ -147,9 +152,9 @@ def jobs_of(case, out, beds, launcher, fix, only=None):
 
 def run_all(jobs, at_once, say):
     """Runs them in their order, so many at once: {job: run, or the line that says why there is none}. One that fails stops none."""
-    course, waiting, running, done = Course(jobs, at_once, say), list(jobs), [], {}
+    course, waiting, running, done, ended = Course(jobs, at_once, say), list(jobs), [], {}, []
     try:
-        while waiting or running:
+        while waiting or running or ended:
             while waiting and len(running) < at_once:
                 job = waiting.pop(0)
                 try:
@@ -162,15 +167,17 @@ def run_all(jobs, at_once, say):
                 except RunError as e:
                     done[job] = str(e)
                     course.end(job, 0, f"FAILED: {e}")
-            for job, process in [pair for pair in running if pair[1].ended()]:
-                running.remove((job, process))
+            for job, process in ended:  # read while the next ones run
                 try:
                     done[job] = job.finish(process)
                     course.end(job, process.wall, f"{done[job].own_time:.1f} s")
                 except RunError as e:
                     done[job] = str(e)
                     course.end(job, process.wall, f"FAILED: {e}")
-            time.sleep(POLL)
+            ended = [pair for pair in running if pair[1].ended()]
+            running = [pair for pair in running if pair not in ended]
+            if not ended:
+                time.sleep(POLL)
     finally:
         for _, process in running:
             process.stop()

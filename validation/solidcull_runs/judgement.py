@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from . import equivalence
 from .points import UNCULLED
 
+WORST_FIRST = (equivalence.OTHER, equivalence.OPEN, equivalence.SAME)
+
 
 @dataclass(frozen=True)
 class Judged:
@@ -40,7 +42,7 @@ class Judged:
     def word(self):
         """Of the metrics' verdicts the worst: all are equivalent, or one is outside, or one is not decided."""
         words = {v.word for v in self.verdicts.values()}
-        return next(w for w in (equivalence.OTHER, equivalence.OPEN, equivalence.SAME) if w in words)
+        return next(w for w in WORST_FIRST if w in words)
 
 
 def main_scene(result):

@@ -9,16 +9,17 @@ class Point:
     keywords: str = ""        # of the fix
     absolute: float = None    # the first number of `tolerance`
     share: float = 0.0        # the second
-    runs: tuple = (1, 2)      # in the quick and in the full size, of the first scene
-    others: tuple = (3, 5)    # likewise of the other scenes
+    runs: int = 1             # of the first scene
+    others: int = 3           # of each other scene
     default: bool = False     # run in every scene, and judged
 
 
 UNCULLED, SLEEP, LIVE, PAPER, BY_HAND = "unculled", "sleep", "live", "paper's scheme", "frozen by hand"
 FAMILIES = (UNCULLED, SLEEP, LIVE, PAPER, BY_HAND)
 DEFAULT = (3, 0)
-ABSOLUTE = {"quick": (1, 10, 30), "full": (0.3, 1, 10, 30, 100)}
-SHARES = {"quick": (0.3,), "full": (0.1, 0.3, 1)}
+# tolerances that are swept, absolute and share, beside the default
+SWEPT = {"quick": {SLEEP: ((1, 0), (10, 0), (30, 0), (3, 0.3)), LIVE: ((10, 0),)},
+         "full": {family: ((1, 0), (10, 0), (30, 0), (3, 0.3)) for family in (SLEEP, LIVE)}}
 
 
 def tolerated(family, absolute, share=0.0, **how):
@@ -27,16 +28,15 @@ def tolerated(family, absolute, share=0.0, **how):
 
 def points(size):
     """All points of a size, in the order in which they are run."""
-    found = [Point(UNCULLED, UNCULLED, runs=(5, 5), default=True)]
+    found = [Point(UNCULLED, UNCULLED, runs=5, default=True)]
     for family in (SLEEP, LIVE):
-        found.append(tolerated(family, *DEFAULT, runs=(5, 5), default=True))
-    for family in (SLEEP, LIVE):
-        found += [tolerated(family, a) for a in ABSOLUTE[size]]
-        found += [tolerated(family, DEFAULT[0], s) for s in SHARES[size]]
+        found.append(tolerated(family, *DEFAULT, runs=5, default=True))
+    for family, tolerances in SWEPT[size].items():
+        found += [tolerated(family, *t) for t in tolerances]
     found.append(Point(PAPER, PAPER, "exterior live store none restore refill"))
     found.append(Point(BY_HAND, BY_HAND))
     return found
 
 
-def runs_of(point, size, main=True):
-    return (point.runs if main else point.others)[size == "full"]
+def runs_of(point, main=True):
+    return point.runs if main else point.others

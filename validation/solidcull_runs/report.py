@@ -56,7 +56,8 @@ class Page:
     def picture(self, file, what):
         self.blocks.append(("picture", file, what))
 
-    def markdown(self):
+    def markdown(self, pictures=None):
+        """`pictures`: the names of those that are shown; all if not said."""
         out = []
         for kind, *b in self.blocks:
             if kind == "heading":
@@ -64,7 +65,8 @@ class Page:
             elif kind == "text":
                 out.append(b[0])
             elif kind == "picture":
-                out.append(f"![{b[1]}]({b[0].name})")
+                if pictures is None or b[0].name in pictures:
+                    out.append(f"![{b[1]}]({b[0].name})")
             else:
                 out.append("\n".join("| " + " | ".join(cells) + " |" for cells in [b[0], ["---"] * len(b[0]), *b[1]]))
         return "\n\n".join(out) + "\n"
@@ -100,35 +102,64 @@ def default_of(judged, family):
     return next((j for j in judged.values() if j.default and j.family == family), None)
 
 
-def first_row(result):
-    """A case in the table of the first page."""
-    judged = judgement.judge(result)
-    scene = judgement.main_scene(result)
-    bound = result["bound"] and result["bound"]["N/N_moving"]
-    cells = [f"[{result['case']}](#{anchor(result['title'])})", f"{scene['granules']:,}", figure_of(bound)]
-    for family in (SLEEP, LIVE):
-        j = default_of(judged, family)
-        cells += [f"{j.speed_up:.2f}", f"{j.error:.2f} ({j.worst})", j.word] if j else ["-", "-", "not run"]
-    return cells + [str(result["lost"])]
+def shown_error(j):
+    return f"{j.error:.2f} ({j.worst})"
+
+
+def first_rows(result):
+    """A case in the table of the first page: a row for each of its scenes."""
+    rows = []
+    for name, scene in result["scenes"].items():
+        judged = judgement.judge(result, scene)
+        main = not rows
+        bound = main and result["bound"] and result["bound"]["N/N_moving"]
+        link = f"[{result['case']}](#{anchor(result['title'])})"
+        cells = [link + f", {name}" * bool(name), f"{scene['granules']:,}", figure_of(bound or None)]
+        for family in (SLEEP, LIVE):
+            j = default_of(judged, family)
+            cells += [f"{j.speed_up:.2f}", shown_error(j), j.word] if j else ["-", "-", "not run"]
+        rows.append(cells)
+    return rows
 
 
 FIRST = ["case", "granules", "N/N_moving", "`sleep`: times faster", "largest error, in margins", "verdict",
-         "`live`: times faster", "largest error, in margins", "verdict", "lost"]
+         "`live`: times faster", "largest error, in margins", "verdict"]
 
 
 def first_page(page, results, folder, how):
     page.heading(1, "solidcull: run time against error")
     page.text(how)
-    page.text("Each case is run unculled at least five times. Its tool, ball or wall starts 10 µm farther each time. Culled runs start from the "
-              "same restart file. An error is what a culled run differs from the unculled one that starts alike, mean of all pairs. It is given in margins, "
+    page.text("Each case is run unculled at least five times. Its tool, ball or wall starts a little farther each time: by 10 µm, or where "
+              "granules are 10 mm wide by 100 µm. Culled runs start from the same restart file. An error is what a culled run differs from the unculled one that starts alike, mean of all pairs. It is given in margins, "
               "which each case's README has fixed before. The verdict is that of two one-sided tests at 5 %: `equivalent`, "
               "`outside`, or `not decided` where the runs scatter too much to tell. Time is that of a core in LIGGGHTS's loop.")
-    page.table(FIRST, [first_row(r) for r in results])
+    page.table(FIRST, [row for r in results for row in first_rows(r)])
+    page.text(f"Granules lost, in all culled runs: {sum(r['lost'] for r in results)}. Runs that failed: {sum(len(r['failed']) for r in results)}.")
     figures.all_cases(results, folder / "all.png")
     page.picture(folder / "all.png", "run time against error, all cases")
     page.text("Large marks: the defaults. Small marks: other tolerances. Left is faster, low is closer to LIGGGHTS; the dotted lines are the "
               "unculled time and the margin. N/N_moving: all granules over those that move by more than d/100 between two snapshots, "
               "the bound of any such method.")
+
+
+def metric_rows(result, judged):
+    """Head and rows of the table of a case's metrics: unculled, and at the defaults."""
+    unculled = judgement.unculled_of(judgement.main_scene(result))
+    defaults = [j for j in (default_of(judged, SLEEP), default_of(judged, LIVE)) if j]
+    rows = []
+    for m in result["metrics"]:
+        values = list(judgement.values_of(unculled, m["name"]).values())
+        mean = sum(values) / len(values)
+        row = [f"{m['name']} ({m['unit']})", f"{mean:.4g}", f"{min(values):.4g} to {max(values):.4g}",
+               f"{100 * m['margin']:g} %" if m["relative"] else f"{m['margin']:g}"]
+        for j in defaults:
+            v = j.verdicts[m["name"]]
+            row += [f"{mean + v.difference:.4g}", f"{v.low:+.2g} to {v.high:+.2g}", v.word]
+        rows.append(row)
+    head = ["metric", "unculled", "least to largest", "margin"]
+    for j in defaults:
+        head += [f"`{j.family}`", "difference lies in", "verdict"]
+    return head, rows
 
 
 def case_section(page, result, folder, runs_folder):
@@ -146,22 +177,7 @@ def case_section(page, result, folder, runs_folder):
     if picture and picture.exists():
         shutil.copyfile(picture, folder / f"{name}-moves.png")
         page.picture(folder / f"{name}-moves.png", f"{name}: what moves")
-    unculled = judgement.unculled_of(judgement.main_scene(result))
-    defaults = [j for j in (default_of(judged, SLEEP), default_of(judged, LIVE)) if j]
-    rows = []
-    for m in result["metrics"]:
-        values = list(judgement.values_of(unculled, m["name"]).values())
-        mean = sum(values) / len(values)
-        row = [f"{m['name']} ({m['unit']})", f"{mean:.4g}", f"{min(values):.4g} to {max(values):.4g}",
-               f"{100 * m['margin']:g} %" if m["relative"] else f"{m['margin']:g}"]
-        for j in defaults:
-            v = j.verdicts[m["name"]]
-            row += [f"{mean + v.difference:.4g}", f"{v.low:+.2g} to {v.high:+.2g}", v.word]
-        rows.append(row)
-    head = ["metric", "unculled", "least to largest", "margin"]
-    for j in defaults:
-        head += [f"`{j.family}`", "difference lies in", "verdict"]
-    page.table(head, rows)
+    page.table(*metric_rows(result, judged))
     if figures.curves(result, folder / f"{name}-curves.png"):
         page.picture(folder / f"{name}-curves.png", f"{name}: metrics against time")
     figures.case_plots(result, judged, folder / f"{name}-error.png")
@@ -201,14 +217,8 @@ def paid(results):
     return rows
 
 
-def write(results, folder, runs_folder=None, how=""):
-    """Writes README.md, its pictures and report.html; whole or not at all."""
-    if not results:
-        raise RunError("no case has results to report")
-    folder = Path(folder)
-    part = folder.with_name(folder.name + ".part")
-    shutil.rmtree(part, ignore_errors=True)
-    part.mkdir(parents=True)
+def page_of(results, part, runs_folder, how):
+    """The report, its pictures in the folder `part`."""
     page = Page()
     first_page(page, results, part, how)
     rows = paid(results)
@@ -218,7 +228,20 @@ def write(results, folder, runs_folder=None, how=""):
         page.table(["case", "way", "time over unculled", "largest error, in margins", "ours"], rows)
     for result in results:
         case_section(page, result, part, runs_folder)
+    return page
+
+
+def write(results, folder, runs_folder=None, how=""):
+    """Writes README.md, its pictures and report.html; whole or not at all. The page."""
+    if not results:
+        raise RunError("no case has results to report")
+    folder = Path(folder)
+    part = folder.with_name(folder.name + ".part")
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    page = page_of(results, part, runs_folder, how)
     (part / "README.md").write_text(page.markdown())
     (part / "report.html").write_text(page.html("solidcull: run time against error"))
     shutil.rmtree(folder, ignore_errors=True)
     part.rename(folder)
+    return page

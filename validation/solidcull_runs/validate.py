@@ -1,4 +1,4 @@
-"""validation/run.sh [--quick|--full] [--report-only|--few-steps] [--at-once N] [CASE ...]
+"""validation/run.sh [--quick|--full] [--report-only|--few-steps] [--publish] [--at-once N] [CASE ...]
 
 Runs cases, unculled and culled, and writes the report. What was run before, with the same deck and the same fix, is not run again:
 after a kill the same command goes on. `--few-steps`: each deck once unculled and once culled, cut short; no report.
@@ -9,7 +9,7 @@ import json
 import sys
 from pathlib import Path
 
-from . import cases, engine, ensembles, errors, few, figures, report
+from . import cases, engine, ensembles, errors, few, figures, publish, report
 from .dumps import read_final
 from .errors import RunError
 from .points import SLEEP, UNCULLED
@@ -30,8 +30,11 @@ def options(argv):
     p.add_argument("--at-once", type=int, default=cores(), metavar="N", help="runs at the same time (default: one a core)")
     p.add_argument("--out", type=Path, default=HERE / "out", metavar="FOLDER", help="beds, logs and results")
     p.add_argument("--report", type=Path, default=None, metavar="FOLDER", help="default: validation/report/SIZE")
+    p.add_argument("--publish", action="store_true", help="keep the report with the sources: validation/RESULTS.md and the README's table")
     p.set_defaults(size="quick")
     a = p.parse_args(argv)
+    if a.publish and (a.few_steps or a.case):
+        p.error("--publish takes all cases, and no --few-steps")
     if a.at_once < 1:
         p.error("--at-once takes 1 or more")
     return a
@@ -92,8 +95,10 @@ def run(a):
             say(f"{case.name} has no results; run it first")
     folder = a.report or HERE / "report" / a.size
     folder.parent.mkdir(parents=True, exist_ok=True)
-    report.write(results, folder, out, f"Made by `validation/run.sh --{a.size}`.")
+    page = report.write(results, folder, out, f"Made by `validation/run.sh --{a.size}`.")
     say(f"report: {folder / 'README.md'} and {folder / 'report.html'}")
+    if a.publish:
+        publish.publish(results, page, folder, HERE.parent)
     return told(failed) or int(any(r["lost"] for r in results))
 
 
@@ -105,11 +110,7 @@ def told(failed):
 
 
 def main(argv=None):
-    try:
-        return errors.status_of("validate", lambda: run(options(argv)))
-    except KeyboardInterrupt:
-        print("validate: stopped; the same command goes on from here", file=sys.stderr)
-        return 2
+    return errors.status_of("validate", lambda: run(options(argv)), "stopped; the same command goes on from here")
 
 
 if __name__ == "__main__":

@@ -6,8 +6,8 @@ from solidcull_runs import meshes, surfaces
 deck, bed = "collapse.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "room", "small", "large", "dt", "low", "high", "pour", "damp", "free")
 grains = {"small": 0.0048, "large": 0.0056, "dt": 1e-4, "skin": 0.002, "low": -0.01, "high": 1.6, "pour": 0.4, "damp": 0.4, "free": 0.2}
-quick = {**grains, "granules": 3000, "bed_granules": 3000, "W": 0.08, "room": 0.8}
-full = {**grains, "granules": 20000, "bed_granules": 20000, "W": 0.15, "room": 1.5, "steps": 12000, "pour": 0.6}
+quick = {**grains, "granules": 3000, "bed_granules": 3000, "W": 0.08, "room": 0.8, "steps": 6000}
+full = {**grains, "granules": 20000, "bed_granules": 20000, "W": 0.15, "room": 1.5, "steps": 7500, "pour": 0.6}
 # its length L goes with the aspect ratio
 scenes = {"quick": {"a = 1": {"L": 0.192}, "a = 0.5": {"L": 0.272}, "a = 2": {"L": 0.136}},
           "full": {"a = 1": {"L": 0.362}, "a = 0.5": {"L": 0.512}, "a = 2": {"L": 0.256}}}

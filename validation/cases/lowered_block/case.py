@@ -6,8 +6,8 @@ from solidcull_runs import meshes, surfaces
 deck, bed = "block.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "low", "high", "pour", "damp", "free")
 grains = {"small": 0.0048, "large": 0.0056, "dt": 1e-4, "skin": 0.002, "low": -0.01, "high": 0.8, "pour": 0.3, "damp": 0.4, "free": 0.2}
-quick = {**grains, "granules": 3000, "bed_granules": 3000, "L": 0.24, "W": 0.16, "side": 0.05}
-full = {**grains, "granules": 20000, "bed_granules": 20000, "L": 0.4, "W": 0.35, "side": 0.1, "depth": 0.04, "speed": 0.06, "hold": 4000, "after": 1000}
+quick = {**grains, "granules": 3000, "bed_granules": 3000, "L": 0.24, "W": 0.16, "side": 0.05, "speed": 0.15, "hold": 800}
+full = {**grains, "granules": 20000, "bed_granules": 20000, "L": 0.4, "W": 0.35, "side": 0.1, "depth": 0.04, "speed": 0.15, "hold": 2000, "after": 1000}
 aside = "aside"
 by_hand = "sphere $(v_L/2) $(v_W/2) ${surface} $(1.7*v_side)"
 curves = {"largest force": "f_mean"}

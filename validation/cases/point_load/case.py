@@ -5,9 +5,9 @@ from solidcull_runs import meshes, moving
 
 deck, bed = "press.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "pour")
-of_both = {"small": 0.0024, "large": 0.0028, "dt": 5e-5, "skin": 0.001, "relax": 1000, "rest": 200, "tap": 0, "plate": 0.02, "press": 0.003, "rows": 4}
+of_both = {"small": 0.0024, "large": 0.0028, "dt": 5e-5, "skin": 0.001, "relax": 500, "rest": 200, "tap": 0, "plate": 0.02, "press": 0.003, "rows": 4}
 quick = {**of_both, "granules": 6000, "bed_granules": 6000, "L": 0.125, "W": 0.125, "pour": 0.2, "pressing": 2000, "hold": 1000}
-full = {**of_both, "granules": 20000, "bed_granules": 20000, "L": 0.2, "W": 0.2, "pour": 0.25, "pressing": 8000, "hold": 4000, "frames": 500}
+full = {**of_both, "granules": 20000, "bed_granules": 20000, "L": 0.2, "W": 0.2, "pour": 0.25, "pressing": 3000, "hold": 1500, "frames": 300}
 scenes = {"slow": {}, "tap": {"press": 0.001, "pressing": 100, "tap": 1}}
 aside = "aside"
 by_hand = "sphere $(v_L/2) $(v_W/2) ${top} $(0.4*v_L)"

@@ -2,8 +2,8 @@
 from solidcull_runs import meshes, surfaces
 
 deck, bed, bed_uses = "wall.in", "../../shared/pour.in", ("bed_granules", "L", "W", "around")
-quick = {"granules": 6000, "bed_granules": 6000, "L": 0.06, "W": 0.03, "around": 0.02}
-full = {"granules": 20000, "bed_granules": 20000, "L": 0.12, "W": 0.045, "around": 0.02, "steps": 8000}
+quick = {"granules": 6000, "bed_granules": 6000, "L": 0.06, "W": 0.03, "around": 0.02, "steps": 2200, "speed": 0.055}
+full = {"granules": 20000, "bed_granules": 20000, "L": 0.12, "W": 0.045, "around": 0.02, "steps": 4500, "speed": 0.045}
 aside, by_hand, curves = "aside", "block $(v_L/3) INF INF INF INF INF", {"active push": "v_push"}
 
 

@@ -5,9 +5,9 @@ from solidcull_runs import meshes, moving
 
 deck, bed = "shake.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "pour")
-of_both = {"small": 0.0024, "large": 0.0028, "dt": 5e-5, "skin": 0.001, "relax": 400, "rest": 300, "pour": 0.2, "frequency": 20, "peak": 0.5}
-quick = {**of_both, "granules": 6000, "bed_granules": 6000, "L": 0.125, "W": 0.125, "cycles": 3, "after": 1000}
-full = {**of_both, "granules": 20000, "bed_granules": 20000, "L": 0.2, "W": 0.2, "cycles": 20, "after": 4000, "frames": 500}
+of_both = {"small": 0.0024, "large": 0.0028, "dt": 5e-5, "skin": 0.001, "relax": 200, "rest": 300, "pour": 0.2, "frequency": 20, "peak": 0.5}
+quick = {**of_both, "granules": 6000, "bed_granules": 6000, "L": 0.125, "W": 0.125, "cycles": 2, "after": 800}
+full = {**of_both, "granules": 20000, "bed_granules": 20000, "L": 0.2, "W": 0.2, "cycles": 4, "after": 1500}
 scenes = {"0.5 g": {}, "2 g": {"peak": 2}}
 aside = "aside"
 curves = {"floor's mean load": "v_floor"}

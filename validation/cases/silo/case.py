@@ -7,9 +7,9 @@ from solidcull_runs import meshes, moving
 
 deck, bed = "discharge.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "low", "high", "pour")
-of_both = {"small": 0.0024, "large": 0.0028, "dt": 5e-5, "skin": 0.001, "low": -0.15, "relax": 400, "rest": 800, "slit": 0.03}
-quick = {**of_both, "granules": 6000, "bed_granules": 6000, "L": 0.18, "W": 0.03, "high": 0.35, "pour": 0.3, "steps": 3600}
-full = {**of_both, "granules": 20000, "bed_granules": 20000, "L": 0.27, "W": 0.045, "high": 0.5, "pour": 0.35, "steps": 20000, "frames": 1000}
+of_both = {"small": 0.0024, "large": 0.0028, "dt": 5e-5, "skin": 0.001, "low": -0.15, "relax": 200, "rest": 500, "slit": 0.03}
+quick = {**of_both, "granules": 6000, "bed_granules": 6000, "L": 0.18, "W": 0.03, "high": 0.35, "pour": 0.3, "steps": 2200}
+full = {**of_both, "granules": 20000, "bed_granules": 20000, "L": 0.27, "W": 0.045, "high": 0.5, "pour": 0.35, "steps": 6000, "frames": 400}
 scenes = {"slit of 30 mm": {}, "slit of 45 mm": {"slit": 0.045}}
 aside = "aside"
 curves = {"mass flow": "v_out", "floor's load, emptying": "v_floor", "right wall's load, emptying": "v_right"}

@@ -6,8 +6,8 @@ import numpy as np
 from solidcull_runs import meshes, surfaces
 
 deck, bed, bed_uses = "impact.in", "../../shared/pour.in", ("bed_granules", "L", "W")
-quick = {"granules": 6001, "bed_granules": 6000, "L": 0.05, "W": 0.05}
-full = {"granules": 20001, "bed_granules": 20000, "L": 0.075, "W": 0.075, "steps": 8000}
+quick = {"granules": 6001, "bed_granules": 6000, "L": 0.05, "W": 0.05, "steps": 2800}
+full = {"granules": 20001, "bed_granules": 20000, "L": 0.075, "W": 0.075, "steps": 6000}
 scenes = {"4000 kg/m3 from 0.1 m": {}, "15000 kg/m3": {"rho": 15000}, "from 0.2 m": {"drop": 0.2}}
 aside = "aside"
 by_hand = "sphere $(v_L/2) $(v_W/2) ${top} $(0.4*v_L)"

@@ -5,11 +5,11 @@ from solidcull_runs import meshes, moving, surfaces
 
 deck, bed = "door.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "low", "high", "pour")
-of_both = {"small": 0.0024, "large": 0.0028, "dt": 5e-5, "skin": 0.001, "low": -0.15, "sink": 0.0026, "relax": 400, "rest": 300}
+of_both = {"small": 0.0024, "large": 0.0028, "dt": 5e-5, "skin": 0.001, "low": -0.15, "sink": 0.0026, "relax": 200, "rest": 300}
 quick = {**of_both, "granules": 6000, "bed_granules": 6000, "L": 0.36, "W": 0.03, "high": 0.2, "pour": 0.2, "wide": 0.06, "sinking": 700,
-         "hold": 300, "steps": 3000}
+         "hold": 300, "steps": 2400}
 full = {**of_both, "granules": 20000, "bed_granules": 20000, "L": 0.54, "W": 0.045, "high": 0.3, "pour": 0.25, "wide": 0.09,
-        "sinking": 2000, "hold": 1000, "steps": 12000, "frames": 1000}
+        "sinking": 1200, "hold": 500, "steps": 4500, "frames": 400}
 aside = "aside"
 by_hand = "block $(v_L/2-2*v_wide) $(v_L/2+2*v_wide) INF INF INF INF"
 curves = {"discharged": "v_out", "door's load, sunk": "v_door"}
