@@ -5,6 +5,7 @@ data/validation_result.json is the result of `validation/run.sh --quick slow_imp
 import json
 import math
 import os
+import re
 import shutil
 import stat
 import statistics
@@ -19,7 +20,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT / "validation"))
-from solidcull_runs import cases, ensembles, equivalence, few, fields, judgement, points, report, validate  # noqa: E402
+from solidcull_runs import cases, ensembles, equivalence, few, fields, judgement, points, publish, report, validate  # noqa: E402
 from solidcull_runs.errors import RunError  # noqa: E402
 
 STORED = ROOT / "tests" / "data" / "validation_result.json"
@@ -108,12 +109,11 @@ class Cases(Folder):
 
 class Points(unittest.TestCase):
     def test_the_sweep(self):
-        for size in cases.SIZES:
-            of_size = points.points(size)
-            self.assertEqual(len({p.name for p in of_size}), len(of_size))
-            self.assertEqual(points.runs_of(of_size[0]), 5)
-            self.assertEqual({p.family for p in of_size}, set(points.FAMILIES))
-            self.assertEqual([p.name for p in of_size if p.default], ["unculled", "sleep 3 0", "live 3 0"])
+        found = points.points()
+        self.assertEqual(len({p.name for p in found}), len(found))
+        self.assertEqual(points.runs_of(found[0]), 5)
+        self.assertEqual({p.family for p in found}, set(points.FAMILIES))
+        self.assertEqual([p.name for p in found if p.default], ["unculled", "sleep 3 0", "live 3 0"])
 
     def test_frozen_by_hand(self):
         text = "read_restart a\nfix integrate all nve/sphere\nrun 5\n"
@@ -242,6 +242,59 @@ class Report(Folder):
         file.write_text(json.dumps(result))
         self.refused("live 3 0 has values of", report.read_result, file)
         self.refused("no case has results to report", report.write, [], self.folder / "report")
+
+
+class Publish(Folder):
+    """What of a report is kept with the sources."""
+
+    def root(self, marks=f"{publish.BEGIN}\nold\n{publish.END}"):
+        root = self.folder / "root"
+        for name in ("README.md", "examples/impact/RESULTS.md"):
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text(f"before\n\n{marks}\n\nafter\n")
+        (root / "validation").mkdir(exist_ok=True)
+        return root
+
+    def published(self, results, root):
+        page = report.write(results, self.folder / "report", None, "From a test.")
+        publish.publish(results, page, self.folder / "report", root)
+
+    def test_tables_of_pages(self):
+        result = {**report.read_result(STORED), "case": "impact"}
+        root = self.root()
+        self.published([result], root)
+        sleep = judgement.judge(result)["sleep 3 0"]
+        readme = (root / "README.md").read_text()
+        self.assertNotIn("old", readme)
+        self.assertTrue(readme.startswith(f"before\n\n{publish.BEGIN}\n\n| scene |") and readme.endswith(f"|\n\n{publish.END}\n\nafter\n"), readme)
+        worst = publish.worst_of(result, "sleep")
+        self.assertIn(f"| [impact](validation/cases/impact/README.md) | 6,001 | 5 s | {sleep.speed_up:.1f} | "
+                      f"{worst.error:.2f} ({worst.worst}), not decided | ", readme)
+        self.assertIn("| depth (m) |", (root / "examples/impact/RESULTS.md").read_text())
+        text = (root / "validation" / "RESULTS.md").read_text()
+        self.assertEqual(re.findall(r"!\[.*?\]\((.*?)\)", text), ["all.png"])
+        self.assertGreater((root / "validation" / "all.png").stat().st_size, 5000)
+        before = readme
+        self.published([result], root)
+        self.assertEqual((root / "README.md").read_text(), before, "a second time changes nothing")
+
+    def test_the_worst_scene_is_told(self):
+        """An error of a scene that is not the main one."""
+        result = report.read_result(STORED)
+        name, scene = list(result["scenes"].items())[1]
+        for run in scene["points"]["sleep 3 0"]["runs"]:
+            run["values"]["depth"] *= 2
+        row = publish.summary_row(result)
+        self.assertRegex(row[4], r"^\d+\.\d+ \(depth\), \*\*outside\*\*$")
+        self.assertEqual(publish.worst_of(result, "sleep").worst, "depth")
+        page = report.first_rows(result)
+        self.assertEqual([r[0].partition(", ")[2] for r in page], list(result["scenes"]))
+        self.assertEqual(page[1][5], "outside", name)
+
+    def test_nothing_is_written_where_a_mark_is_missing(self):
+        root = self.root(publish.BEGIN)
+        self.refused("has no lines '<!-- made by", self.published, [report.read_result(STORED)], root)
+        self.assertFalse((root / "validation" / "RESULTS.md").exists())
 
 
 class Command(Folder):

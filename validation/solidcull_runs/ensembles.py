@@ -69,27 +69,36 @@ class CaseJob(KeptJob):
 
 
 class Course:
-    """Says how far all runs are, and about how long the rest takes: by granules, and how long runs took for each of them."""
+    """Says how far all runs are, and about how long the rest takes: as long as others of the scene did, else by granules."""
 
     def __init__(self, jobs, at_once, say):
-        self.weights = {id(job): job.case.granules(job.scene) * (1 if job.kind == "unculled" else 0.6) for job in jobs}
-        self.left, self.at_once, self.say = sum(self.weights.values()), at_once, say
-        self.done, self.spent, self.all = 0.0, 0.0, len(jobs)
-        self.ended = 0
+        self.left, self.at_once, self.say, self.all = list(jobs), at_once, say, len(jobs)
+        self.spent = {}  # by scene: seconds, and the parts of an unculled run that took them
 
     def skip(self, job):
-        self.left -= self.weights[id(job)]
-        self.ended += 1
+        """It was made before."""
+        self.left.remove(job)
 
     def end(self, job, seconds, what):
-        weight = self.weights[id(job)]
-        self.left -= weight
-        self.done += weight
-        self.spent += seconds
-        self.ended += 1
-        left = self.left * self.spent / self.done / self.at_once if self.done else 0
+        self.left.remove(job)
+        of_scene = self.spent.setdefault((job.case.name, job.scene), [0.0, 0.0])
+        of_scene[0] += seconds
+        of_scene[1] += self.part(job)
+        left = self.seconds_left() / self.at_once
         shown = f"{left / 60:.0f} min" if left > 100 else f"{left:.0f} s"
-        self.say(f"{job.case.name}: {job.name}: {what}; {self.ended} of {self.all} runs, about {shown} left")
+        self.say(f"{job.case.name}: {job.name}: {what}; {self.all - len(self.left)} of {self.all} runs, about {shown} left")
+
+    @staticmethod
+    def part(job):
+        return 1 if job.kind == "unculled" else 0.7
+
+    def seconds_left(self):
+        scenes = {(job.case.name, job.scene): job.case.granules(job.scene) for job in self.left}
+        done = {key: seconds / parts for key, (seconds, parts) in self.spent.items()}
+        mean = statistics.fmean(done.values())
+        size = statistics.fmean(scenes.values()) if scenes else 1
+        each = {key: done.get(key, mean * granules / size) for key, granules in scenes.items()}
+        return sum(each[job.case.name, job.scene] * self.part(job) for job in self.left)
 
 
 def files_of(case, scene, out):
@@ -138,7 +147,7 @@ def jobs_of(case, out, beds, launcher, fix, only=None):
         texts = [f.read_text() for f in sorted({*case.folder.glob("*.in"), *(case.folder.parent.parent / "shared").glob("*.in")} - {case.deck})]
         texts.append(bed.with_suffix(".recipe").read_text() if bed else "")
         main = scene == case.main_scene
-        wanted = [p for p in points(case.size) if (p.default or main) and (p.family != BY_HAND or case.get("by_hand"))]
+        wanted = [p for p in points() if (p.default or main) and (p.family != BY_HAND or case.get("by_hand"))]
         for k in range(max(runs_of(p, main) for p in wanted)):
             for p in wanted:
                 if k >= runs_of(p, main) or (only and (p.name not in only[0] or k >= only[1])):
@@ -150,9 +159,10 @@ def jobs_of(case, out, beds, launcher, fix, only=None):
     return jobs
 
 
-def run_all(jobs, at_once, say):
-    """Runs them in their order, so many at once: {job: run, or the line that says why there is none}. One that fails stops none."""
-    course, waiting, running, done, ended = Course(jobs, at_once, say), list(jobs), [], {}, []
+def run_all(jobs, course):
+    """Runs them in their order, as many at once as the course says: {job: run, or the line that says why there is none}. One that
+    fails stops none."""
+    at_once, waiting, running, done, ended = course.at_once, list(jobs), [], {}, []
     try:
         while waiting or running or ended:
             while waiting and len(running) < at_once:

@@ -4,7 +4,7 @@ import re
 import numpy as np
 
 from .engine import run_liggghts
-from .ensembles import CaseJob, files_of, run_all, short_hash
+from .ensembles import CaseJob, Course, files_of, run_all, short_hash
 from .errors import RunError
 from .points import UNCULLED, Point
 
@@ -75,7 +75,7 @@ def faults_of(case, out, launcher, say):
         jobs = [ShortJob(case, scene, p, 0, out, given, 0, launcher, "") for p in POINTS]
         for job in jobs:
             job.file(".kept").unlink(missing_ok=True)
-        for job, run in run_all(jobs, 1, say).items():
+        for job, run in run_all(jobs, Course(jobs, 1, say)).items():
             wrong = run if isinstance(run, str) else fault(run, run.start)
             if wrong:
                 found.append(f"{case.name}, a few steps: {job.name}: {wrong}")

@@ -18,20 +18,19 @@ UNCULLED, SLEEP, LIVE, PAPER, BY_HAND = "unculled", "sleep", "live", "paper's sc
 FAMILIES = (UNCULLED, SLEEP, LIVE, PAPER, BY_HAND)
 DEFAULT = (3, 0)
 # tolerances that are swept, absolute and share, beside the default
-SWEPT = {"quick": {SLEEP: ((1, 0), (10, 0), (30, 0), (3, 0.3)), LIVE: ((10, 0),)},
-         "full": {family: ((1, 0), (10, 0), (30, 0), (3, 0.3)) for family in (SLEEP, LIVE)}}
+SWEPT = {SLEEP: ((1, 0), (10, 0), (30, 0), (3, 0.3)), LIVE: ((10, 0),)}
 
 
 def tolerated(family, absolute, share=0.0, **how):
     return Point(f"{family} {absolute:g} {share:g}", family, f"exterior {family} tolerance {absolute:g} {share:g}", absolute, share, **how)
 
 
-def points(size):
-    """All points of a size, in the order in which they are run."""
+def points():
+    """All points, in the order in which they are run."""
     found = [Point(UNCULLED, UNCULLED, runs=5, default=True)]
     for family in (SLEEP, LIVE):
         found.append(tolerated(family, *DEFAULT, runs=5, default=True))
-    for family, tolerances in SWEPT[size].items():
+    for family, tolerances in SWEPT.items():
         found += [tolerated(family, *t) for t in tolerances]
     found.append(Point(PAPER, PAPER, "exterior live store none restore refill"))
     found.append(Point(BY_HAND, BY_HAND))

@@ -44,10 +44,9 @@ def say(line):
     print(line, flush=True)
 
 
-def run_case(case, out, beds, launcher, fix, at_once):
+def run_case(case, jobs, course, out):
     """Runs it and leaves its results; the lines of what failed."""
-    jobs = ensembles.jobs_of(case, out, beds, launcher, fix)
-    done = ensembles.run_all(jobs, at_once, say)
+    done = ensembles.run_all(jobs, course)
     result = ensembles.result_of(case, done)
     draw(case, done, out / case.name / "what_moves.png")
     file = ensembles.results_file(out, case)
@@ -80,9 +79,16 @@ def run(a):
         launcher = engine.find_launcher()
         fix = ensembles.fix_hash(launcher)
         beds = ensembles.make_beds(wanted, out, a.at_once, say)
+        jobs = {}
         for case in wanted:
             try:
-                failed += run_case(case, out, beds, launcher, fix, a.at_once)
+                jobs[case] = ensembles.jobs_of(case, out, beds, launcher, fix)
+            except RunError as e:
+                failed.append(str(e))
+        course = ensembles.Course([job for of_case in jobs.values() for job in of_case], a.at_once, say)
+        for case, of_case in jobs.items():
+            try:
+                failed += run_case(case, of_case, course, out)
             except RunError as e:
                 failed.append(str(e))
                 say(f"{case.name}: {e}")

@@ -5,7 +5,7 @@ from solidcull_runs import meshes
 
 deck, bed, bed_uses = "fall.in", "../../../examples/falling_mass/make.in", ("granules",)
 quick = {"granules": 6000, "seen": 14}
-full = {"granules": 15600, "seen": 24}
+full = {"granules": 15600, "seen": 16}
 aside = "aside"
 curves = {"peak load on the floor": "v_load"}
 picture = ("y", 0.5, 1)

@@ -6,7 +6,7 @@ from solidcull_runs import moving
 deck = "gas.in"
 of_both = {"small": 0.0024, "large": 0.0028, "dt": 5e-5, "skin": 0.002, "relax": 200}
 quick = {**of_both, "granules": 6000, "L": 0.2, "steps": 12000}
-full = {**of_both, "granules": 20000, "L": 0.3, "steps": 30000, "frames": 1000}
+full = {**of_both, "granules": 20000, "L": 0.3, "steps": 20000, "frames": 1000}
 aside = "aside"
 
 

@@ -7,7 +7,7 @@ deck, bed = "switch.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "pour")
 of_both = {"small": 0.0024, "large": 0.0028, "dt": 5e-5, "skin": 0.001, "relax": 200, "rest": 300, "pour": 0.2, "without": 1000}
 quick = {**of_both, "granules": 6000, "bed_granules": 6000, "L": 0.125, "W": 0.125, "after": 2200}
-full = {**of_both, "granules": 20000, "bed_granules": 20000, "L": 0.2, "W": 0.2, "after": 4000}
+full = {**of_both, "granules": 20000, "bed_granules": 20000, "L": 0.2, "W": 0.2, "after": 3500}
 aside = "aside"
 curves = {"floor's peak load": "v_floor"}
 

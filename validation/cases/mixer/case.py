@@ -7,7 +7,7 @@ deck, bed = "mixer.in", "bed.in"
 bed_uses = ("bed_granules", "radius", "blade", "blade_high", "high", "small", "large", "dt", "skin", "period", "fill")
 of_both = {"small": 0.0024, "large": 0.0028, "dt": 5e-5, "skin": 0.001, "relax": 200, "period": 0.25, "fill": 9000}
 quick = {**of_both, "granules": 6000, "bed_granules": 6000, "radius": 0.075, "blade": 0.07, "blade_high": 0.035, "high": 0.25, "steps": 2400}
-full = {**of_both, "granules": 20000, "bed_granules": 20000, "radius": 0.112, "blade": 0.105, "blade_high": 0.05, "high": 0.35, "steps": 6000}
+full = {**of_both, "granules": 20000, "bed_granules": 20000, "radius": 0.112, "blade": 0.105, "blade_high": 0.05, "high": 0.35, "steps": 4000}
 aside = "aside"
 curves = {"torque": "v_torque"}
 

@@ -8,7 +8,7 @@ bed_uses = ("bed_granules", "L", "W", "small", "large", "E", "mu", "restitution"
 of_both = {"small": 0.001, "large": 0.001, "skin": 0.0004, "E": 2e7, "mu": 0.3, "restitution": 0.5, "dt": 1e-5, "rho": 2500,
            "drop": 2**2 / (2 * 9.81), "damp": 0.12, "free": 0.06}
 quick = {**of_both, "granules": 6001, "bed_granules": 6000, "L": 0.04, "W": 0.04, "ball": 0.01, "pour": 0.12, "steps": 3200}
-full = {**of_both, "granules": 50001, "bed_granules": 50000, "L": 0.08, "W": 0.08, "ball": 0.02, "pour": 0.16, "steps": 5000}
+full = {**of_both, "granules": 50001, "bed_granules": 50000, "L": 0.08, "W": 0.08, "ball": 0.02, "pour": 0.16, "steps": 4200}
 aside = "aside"
 by_hand = "sphere $(v_L/2) $(v_W/2) ${top} $(0.4*v_L)"
 curves = {"depth": "v_depth", "peak force on the ball": "v_force", "peak rise of the floor's load": "v_floor"}

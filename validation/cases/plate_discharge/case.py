@@ -6,7 +6,7 @@ from solidcull_runs import meshes
 deck, bed = "discharge.in", "fill.in"
 bed_uses = ("granules", "L", "W")
 quick = {"granules": 2400, "L": 0.36, "W": 0.06, "steps": 9000}
-full = {"granules": 20000, "L": 0.72, "W": 0.1, "steps": 14000}
+full = {"granules": 20000, "L": 0.72, "W": 0.1, "steps": 11000}
 aside = "aside"
 by_hand = "block $(-v_L/3) $(v_L/3) INF INF 0.15 INF side out"
 curves = {"load of the plate": "v_load"}

@@ -9,7 +9,7 @@ grains = {"small": 0.0048, "large": 0.0056, "dt": 1e-4, "skin": 0.002, "low": -0
 quick = {**grains, "granules": 3600, "bed_granules": 3600, "L": 0.32, "W": 0.13, "R": 0.06, "wide": 0.05, "start": 0.1,
          "path": 0.08, "speed": 0.25, "lower": 0.2}
 full = {**grains, "granules": 20000, "bed_granules": 20000, "L": 0.7, "W": 0.24, "R": 0.1, "wide": 0.08, "start": 0.15,
-        "path": 0.16, "speed": 0.25, "lower": 0.2, "sink": 0.02}
+        "path": 0.13, "speed": 0.25, "lower": 0.2, "sink": 0.02}
 scenes = {"slip 0.3": {}, "slip 0.1": {"slip": 0.1}}
 aside = "aside"
 by_hand = "block $(v_start-0.09) $(v_start+v_path+0.1) INF INF $(v_surface-v_sink-0.04) INF"
