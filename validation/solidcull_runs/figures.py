@@ -1,6 +1,4 @@
 """Figures of the validation report."""
-import statistics
-
 import numpy as np
 
 from . import dumps, judgement
@@ -74,6 +72,7 @@ def cost_against_error(ax, result, judged, labels=True):
     if bound:
         ax.axvline(1 / bound, color="0.5", lw=0.8, ls="--")
     ax.set(xscale="log", yscale="log", xlabel="time over unculled", ylabel="largest error (margins)", ylim=(LEAST / 2, None))
+    shares(ax)
 
 
 def case_plots(result, judged, file):
@@ -94,21 +93,49 @@ def case_plots(result, judged, file):
     save(figure, file)
 
 
+def shares(ax):
+    """Times over the unculled time as plain numbers."""
+    ax.set_xticks([0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2], ["0.1", "0.2", "0.3", "0.5", "0.7", "1", "1.5", "2"])
+    ax.set_xticks([], minor=True)
+
+
+def without_overlap(ax, labels, height=9, width=5.2):
+    """Names beside their points (x, y, text), moved down where they would lie on one another. `height`, `width`: of a line and of a
+    letter, in points."""
+    to_points = ax.transData.transform
+    scale = 72 / ax.figure.dpi
+    placed = []
+    for x, y, text in sorted(labels, key=lambda label: -label[1]):
+        at = to_points((x, y)) * scale
+        low, left, right = at[1], at[0] + 6, at[0] + 6 + width * len(text)
+        for other_low, other_left, other_right in placed:  # from above to below
+            if left < other_right and other_left < right and abs(other_low - low) < height:
+                low = other_low - height
+        placed.append((low, left, right))
+        placed.sort(reverse=True)
+        ax.annotate(text, (x, y), fontsize=7, xytext=(6, low - at[1] - 3), textcoords="offset points",
+                    arrowprops={"arrowstyle": "-", "lw": 0.3, "color": "0.6", "shrinkA": 0, "shrinkB": 2})
+
+
 def all_cases(results, file):
     """Run time against error of all cases: the defaults named, the rest of the sweep small."""
-    figure, ax = plt.subplots(figsize=(8, 5))
+    figure, ax = plt.subplots(figsize=(9, 6))
+    labels = []
     for result in results:
         judged = judgement.judge(result)
         for j in judged.values():
-            ax.plot(j.of_unculled, shown(j.error), MARKS[j.family], color=COLOURS[j.family], ms=8 if j.default else 3.5, alpha=1 if j.default else 0.5)
+            ax.plot(j.of_unculled, shown(j.error), MARKS[j.family], color=COLOURS[j.family], ms=8 if j.default else 3.5, alpha=1 if j.default else 0.4)
             if j.default and j.family == SLEEP:
-                ax.annotate(result["case"], (j.of_unculled, shown(j.error)), fontsize=7, xytext=(5, 3), textcoords="offset points")
+                labels.append((j.of_unculled, shown(j.error), result["case"].replace("_", " ")))
     for family in FAMILIES[1:]:
         ax.plot([], [], MARKS[family], color=COLOURS[family], label=family)
     ax.axhline(1, color="0.5", lw=0.8, ls=":")
     ax.axvline(1, color="0.5", lw=0.8, ls=":")
-    ax.set(xscale="log", yscale="log", xlabel="time over unculled", ylabel="largest error (margins)")
-    ax.legend(fontsize=8)
+    ax.set(xscale="log", yscale="log", xlabel="time over unculled", ylabel="largest error (margins)", ylim=(LEAST / 3, None))
+    ax.set_xlim(right=ax.get_xlim()[1] * 1.3)
+    shares(ax)
+    without_overlap(ax, labels)
+    ax.legend(fontsize=8, loc="lower left")
     save(figure, file)
 
 
@@ -195,13 +222,3 @@ def what_moves(unculled, culled, file, diameter, cut=(1, 0.5), largest=np.inf):
     figure.suptitle(f"step {step:,}", fontsize=9)
     save(figure, file, dpi=110)
     return True
-
-
-def mean_speed_up(results):
-    """Geometric mean of the default points' speed-ups, by family."""
-    found = {}
-    for family in (SLEEP, LIVE):
-        ups = [j.speed_up for r in results for j in judgement.judge(r).values() if j.default and j.family == family]
-        if ups:
-            found[family] = statistics.geometric_mean(ups)
-    return found
