@@ -112,7 +112,7 @@ class Points(unittest.TestCase):
         found = points.points()
         self.assertEqual(len({p.name for p in found}), len(found))
         self.assertEqual(points.runs_of(found[0]), 5)
-        self.assertEqual({p.family for p in found}, set(points.FAMILIES))
+        self.assertEqual({p.family for p in points.points(["depth 1"])}, set(points.FAMILIES))
         self.assertEqual([p.name for p in found if p.default], ["unculled", "sleep 3 0", "live 3 0"])
 
     def test_frozen_by_hand(self):

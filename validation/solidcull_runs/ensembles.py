@@ -13,7 +13,7 @@ from .cases import short_hash
 from .engine import POLL, hash_of_fix, stop_all
 from .errors import RunError
 from .logs import FROM_HERE
-from .points import BY_HAND, PAPER, UNCULLED, points, runs_of
+from .points import ALSO, BY_HAND, PAPER, UNCULLED, points, runs_of
 from .twins import KeptJob
 
 ASIDE = [k * 1e-5 for k in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5)]  # m: the place of a tool, ball or wall in each run
@@ -137,8 +137,8 @@ def make_beds(cases, out, at_once, say):
     return files
 
 
-def jobs_of(case, out, beds, launcher, fix, only=None):
-    """All runs of a case, unculled and culled ones in turns. `only`: (points by name, runs of each)."""
+def jobs_of(case, out, beds, launcher, fix, also=()):
+    """All runs of a case, unculled and culled ones in turns. `also`: see points()."""
     jobs = []
     for scene in case.scenes:
         v = case.variables(scene)
@@ -147,10 +147,10 @@ def jobs_of(case, out, beds, launcher, fix, only=None):
         texts = [f.read_text() for f in sorted({*case.folder.glob("*.in"), *(case.folder.parent.parent / "shared").glob("*.in")} - {case.deck})]
         texts.append(bed.with_suffix(".recipe").read_text() if bed else "")
         main = scene == case.main_scene
-        wanted = [p for p in points() if (p.default or main) and (p.family != BY_HAND or case.get("by_hand"))]
+        wanted = [p for p in points(also) if (p.everywhere or main) and (p.family != BY_HAND or case.get("by_hand"))]
         for k in range(max(runs_of(p, main) for p in wanted)):
             for p in wanted:
-                if k >= runs_of(p, main) or (only and (p.name not in only[0] or k >= only[1])):
+                if k >= runs_of(p, main):
                     continue
                 frames = v.get("frames", FRAMES) if k == 0 and p.default and main else 0
                 aside = {case.need("aside"): ASIDE[k]}
@@ -262,7 +262,7 @@ def result_of(case, done):
     unculled = next((p for p in finals if p.family == UNCULLED), None)
     if unculled:
         for p, of_point in finals.items():
-            if p is not unculled and (p.default or p.family == PAPER):
+            if p is not unculled and (p.default or p.family in (PAPER, ALSO)):
                 result["fields"][p.name] = fields.distances(of_point, finals[unculled])
         diameter = 2 * float(np.median(finals[unculled][0]["radius"]))
         framed = next((job for job in main if job.point is unculled and job.frames), None)

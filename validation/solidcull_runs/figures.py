@@ -4,10 +4,10 @@ import numpy as np
 from . import dumps, judgement
 from .pictures import STATES
 from .plots import plt, save
-from .points import BY_HAND, FAMILIES, LIVE, PAPER, SLEEP, UNCULLED
+from .points import ALSO, BY_HAND, FAMILIES, LIVE, PAPER, SLEEP, UNCULLED
 
-COLOURS = {UNCULLED: "0.35", SLEEP: "tab:blue", LIVE: "tab:orange", PAPER: "tab:red", BY_HAND: "tab:green"}
-MARKS = {UNCULLED: "s", SLEEP: "o", LIVE: "^", PAPER: "X", BY_HAND: "D"}
+COLOURS = {UNCULLED: "0.35", SLEEP: "tab:blue", LIVE: "tab:orange", PAPER: "tab:red", BY_HAND: "tab:green", ALSO: "tab:purple"}
+MARKS = {UNCULLED: "s", SLEEP: "o", LIVE: "^", PAPER: "X", BY_HAND: "D", ALSO: "*"}
 LEAST = 1e-3  # margins: below, an error is drawn here
 
 
@@ -56,14 +56,15 @@ def cost_against_error(ax, result, judged, labels=True):
     for family in FAMILIES:
         points = sorted((j for j in judged.values() if j.family == family and not j.share), key=lambda j: j.absolute or 0)
         if points:
-            ax.plot([j.of_unculled for j in points], [shown(j.error) for j in points], MARKS[family] + "-", color=COLOURS[family], ms=6, lw=0.8,
-                    label=family)
+            ax.plot([j.of_unculled for j in points], [shown(j.error) for j in points], MARKS[family], ls="" if family == ALSO else "-",
+                    color=COLOURS[family], ms=6, lw=0.8, label=family)
         relative = [j for j in judged.values() if j.family == family and j.share]
         ax.plot([j.of_unculled for j in relative], [shown(j.error) for j in relative], MARKS[family], color=COLOURS[family], mfc="none", ms=6)
         if labels:
             for j in [*points, *relative]:
-                if j.absolute:
-                    ax.annotate(f"{j.absolute:g}" + f" {j.share:g}" * bool(j.share), (j.of_unculled, shown(j.error)), fontsize=6,
+                if j.absolute or family == ALSO:
+                    name = j.name if family == ALSO else f"{j.absolute:g}" + f" {j.share:g}" * bool(j.share)
+                    ax.annotate(name, (j.of_unculled, shown(j.error)), fontsize=6,
                                 xytext=(3, 3), textcoords="offset points")
     ax.plot([1], [shown(noise)], MARKS[UNCULLED], color=COLOURS[UNCULLED], label=UNCULLED)
     ax.axhspan(LEAST / 2, shown(noise), color="0.9", lw=0)
@@ -127,8 +128,10 @@ def all_cases(results, file):
             ax.plot(j.of_unculled, shown(j.error), MARKS[j.family], color=COLOURS[j.family], ms=8 if j.default else 3.5, alpha=1 if j.default else 0.4)
             if j.default and j.family == SLEEP:
                 labels.append((j.of_unculled, shown(j.error), result["case"].replace("_", " ")))
-    for family in FAMILIES[1:]:
-        ax.plot([], [], MARKS[family], color=COLOURS[family], label=family)
+    seen = {j.family for result in results for j in judgement.judge(result).values()}
+    for family in FAMILIES:
+        if family in seen:
+            ax.plot([], [], MARKS[family], color=COLOURS[family], label=family)
     ax.axhline(1, color="0.5", lw=0.8, ls=":")
     ax.axvline(1, color="0.5", lw=0.8, ls=":")
     ax.set(xscale="log", yscale="log", xlabel="time over unculled", ylabel="largest error (margins)", ylim=(LEAST / 3, None))

@@ -196,7 +196,7 @@ def case_section(page, result, folder, runs_folder):
         others = judgement.judge(result, of)
         if others:
             page.table([f"scene {scene}", "times faster", "largest error, in margins", "of", "verdict"],
-                       [[f"`{j.family}`", f"{j.speed_up:.2f}", f"{j.error:.2f}", j.worst, j.word] for j in others.values()])
+                       [[f"`{j.name}`", f"{j.speed_up:.2f}", f"{j.error:.2f}", j.worst, j.word] for j in others.values()])
     if result["laws"]:
         families = ["unculled", SLEEP, LIVE]
         page.table(["law", "known", *families], [[law["what"], law["known"], *(figure_of(law["values"].get(f)) for f in families)] for law in result["laws"]])

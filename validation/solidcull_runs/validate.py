@@ -1,4 +1,4 @@
-"""validation/run.sh [--quick|--full] [--report-only|--few-steps] [--publish] [--at-once N] [CASE ...]
+"""validation/run.sh [--quick|--full] [--report-only|--few-steps] [--publish] [--also KEYWORDS] [--at-once N] [CASE ...]
 
 Runs cases, unculled and culled, and writes the report. What was run before, with the same deck and the same fix, is not run again:
 after a kill the same command goes on. `--few-steps`: each deck once unculled and once culled, cut short; no report.
@@ -27,14 +27,15 @@ def options(argv):
     how = p.add_mutually_exclusive_group()
     how.add_argument("--report-only", action="store_true", help="run nothing; write the report of the results that there are")
     how.add_argument("--few-steps", action="store_true", help="each deck for a few steps: that all of it still runs")
+    p.add_argument("--also", action="append", default=[], metavar="KEYWORDS", help="a point more: these keywords of the fix; may be repeated")
     p.add_argument("--at-once", type=int, default=cores(), metavar="N", help="runs at the same time (default: one a core)")
     p.add_argument("--out", type=Path, default=HERE / "out", metavar="FOLDER", help="beds, logs and results")
     p.add_argument("--report", type=Path, default=None, metavar="FOLDER", help="default: validation/report/SIZE")
     p.add_argument("--publish", action="store_true", help="keep the report with the sources: validation/RESULTS.md and the README's table")
     p.set_defaults(size="quick")
     a = p.parse_args(argv)
-    if a.publish and (a.few_steps or a.case):
-        p.error("--publish takes all cases, and no --few-steps")
+    if a.publish and (a.few_steps or a.case or a.also):
+        p.error("--publish takes all cases, and neither --few-steps nor --also")
     if a.at_once < 1:
         p.error("--at-once takes 1 or more")
     return a
@@ -82,7 +83,7 @@ def run(a):
         jobs = {}
         for case in wanted:
             try:
-                jobs[case] = ensembles.jobs_of(case, out, beds, launcher, fix)
+                jobs[case] = ensembles.jobs_of(case, out, beds, launcher, fix, a.also)
             except RunError as e:
                 failed.append(str(e))
         course = ensembles.Course([job for of_case in jobs.values() for job in of_case], a.at_once, say)
