@@ -27,7 +27,7 @@ STORED = ROOT / "tests" / "data" / "validation_result.json"
 README = """# A case
 
 **Claim.** It is
-the same.
+[the same](a.in).
 
 **Reference.** Itself.
 
@@ -266,7 +266,7 @@ class Publish(Folder):
         sleep = judgement.judge(result)["sleep 3 0"]
         readme = (root / "README.md").read_text()
         self.assertNotIn("old", readme)
-        self.assertTrue(readme.startswith(f"before\n\n{publish.BEGIN}\n\n| scene |") and readme.endswith(f"|\n\n{publish.END}\n\nafter\n"), readme)
+        self.assertTrue(readme.startswith(f"before\n\n{publish.BEGIN}\n| scene |") and readme.endswith(f"|\n{publish.END}\n\nafter\n"), readme)
         worst = publish.worst_of(result, "sleep")
         self.assertIn(f"| [impact](validation/cases/impact/README.md) | 6,001 | 5 s | {sleep.speed_up:.1f} | "
                       f"{worst.error:.2f} ({worst.worst}), not decided | ", readme)

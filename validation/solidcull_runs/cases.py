@@ -72,11 +72,11 @@ def metrics_of(readme, where):
 
 
 def paragraph(readme, name, where):
-    """What stands behind **name.** up to the next empty line."""
+    """What stands behind **name.** up to the next empty line; of links the text, for they lead from the case's folder."""
     found = re.search(rf"\*\*{name}\.\*\*\s+(.+?)(?:\n\s*\n|\Z)", readme, re.S)
     if not found:
         raise RunError(f"{where} has no paragraph '**{name}.** ...'")
-    return " ".join(found[1].split())
+    return re.sub(r"\[([^]]+)\]\([^)]+\)", r"\1", " ".join(found[1].split()))
 
 
 class Case:

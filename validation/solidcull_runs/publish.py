@@ -61,7 +61,7 @@ def between_marks(file, table):
     found = re.search(rf"({re.escape(BEGIN)}\n).*?({re.escape(END)})", text, re.S)
     if not found:
         raise RunError(f"{file} has no lines '{BEGIN}' and '{END}' to put a table between")
-    return text[:found.end(1)] + "\n" + table + "\n" + text[found.start(2):]
+    return text[:found.end(1)] + table + text[found.start(2):]
 
 
 def publish(results, page, report_folder, root):
