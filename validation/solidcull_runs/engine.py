@@ -83,6 +83,8 @@ class Process:
             command = ["stdbuf", "-oL", *command]
         if ranks > 1:
             command = ["mpirun", "--oversubscribe", "-np", str(ranks), *command]
+        if shutil.which("setpriv"):  # a driver that is killed leaves no run behind
+            command = ["setpriv", "--pdeathsig", "KILL", *command]
         self.wall = self.cpu = None  # s: from start to end, and of processors, once it has ended
         self.began = time.monotonic()
         with open(screen or log, "w") as f:
