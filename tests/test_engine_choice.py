@@ -10,10 +10,12 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(ROOT / "validation"))
+from solidcull_runs.engine import environment  # noqa: E402
+
 ADAPTERS = ROOT / "fix_solid_cull" / "liggghts"
 LAUNCHER = Path(os.environ.get("SOLIDCULL_LAUNCHER", ROOT / "build/liggghts-solidcull")).resolve()
-MPI = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_ess_singleton_isolated": "1",
-       "OMPI_MCA_plm_rsh_agent": ""}
 DEBIAN = Path("/usr/include/liggghts/lammps.h")
 
 HEADERS = ("lammps.h", "fix.h", "fix_contact_history.h", "fix_mesh_surface.h", "domain.h", "memory.h", "modify.h", "pair.h")
@@ -300,7 +302,7 @@ class RunTime(unittest.TestCase):
         if not engine or "libasan" in linked:
             self.skipTest("the engine of this build cannot be loaded first")
         with tempfile.TemporaryDirectory(prefix="solidcull-") as folder:
-            done = quietly([sys.executable, "-c", LATE, engine[1], plugin], cwd=folder, env={**os.environ, **MPI})
+            done = quietly([sys.executable, "-c", LATE, engine[1], plugin], cwd=folder, env=environment())
             self.assertNotEqual(done.returncode, 0, done.stdout)
             log = (Path(folder) / "log").read_text(errors="replace")
         self.assertIn("fix cull solid/cull: calls of Modify::add_fix of this LIGGGHTS (", log)

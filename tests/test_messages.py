@@ -3,20 +3,20 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(ROOT / "validation"))
+from solidcull_runs import engine  # noqa: E402
+
 LAUNCHER = Path(os.environ.get("SOLIDCULL_LAUNCHER", ROOT / "build/liggghts-solidcull")).resolve()
 LIBRARY = LAUNCHER.parent / "libsolidcull.so"
 STOCK = shutil.which("liggghts")
 TIME_LIMIT = 60  # s for one deck
-
-MPI = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_plm_rsh_agent": "",
-       "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMP_NUM_THREADS": "1",
-       "OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_pml": "ob1"}
-NO_FOLDER = {"OMPI_MCA_orte_create_session_dirs": "0"}  # for one rank without mpirun: programs that end take it from those that start
 
 HERTZ = "gran model hertz tangential history"
 MATERIAL = """\
@@ -99,7 +99,7 @@ class Run:
             words = [str(program or LAUNCHER), "-in", "deck.in", "-log", "log", "-screen", "screen"]
             if ranks > 1:
                 words = ["mpirun", "-np", str(ranks)] + words
-            env = {**os.environ, **MPI, **(NO_FOLDER if ranks == 1 else {}), **({"LD_PRELOAD": str(preload)} if preload else {}), **variables}
+            env = {**engine.environment(ranks), **({"LD_PRELOAD": str(preload)} if preload else {}), **variables}
             for name in unset:
                 env.pop(name, None)
             done = subprocess.run(words, cwd=place, env=env, timeout=TIME_LIMIT, text=True, stdout=subprocess.PIPE,

@@ -1,15 +1,17 @@
 """Each fix and compute style of LIGGGHTS has its treatment beside solid/cull, and the page of styles says the same as the
 code. The page names each style of every other kind too."""
-import os
 import re
 import shutil
 import subprocess
+import sys
 import unittest
 from pathlib import Path
 
-import test_messages as messages
-
 ROOT = Path(__file__).resolve().parents[1]
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(ROOT / "validation"))
+from solidcull_runs import engine  # noqa: E402
+
 CODE = ROOT / "fix_solid_cull" / "liggghts"
 PAGE = ROOT / "fix_solid_cull" / "other_styles.md"
 HELPERS = {"MINIMIZE", "READ_RESTART", "RESPA", "STORE"}  # LIGGGHTS's own: no line of a deck names them
@@ -57,7 +59,7 @@ def in_page(heading, rows):
 def styles_of_liggghts(kind):
     """As `liggghts -h` lists them, between two lines with a star."""
     told = subprocess.run(["liggghts", "-h"], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
-                          env={**os.environ, **messages.MPI, **messages.NO_FOLDER}).stdout
+                          env=engine.environment()).stdout
     if "* " + kind not in told:
         raise AssertionError(f"liggghts -h lists no {kind} It said:\n{told[:2000]}")
     return set(told.split("* " + kind)[1].split("\n*")[0].split())

@@ -105,7 +105,6 @@ void Refill::pack(int sweeps, bool look_for_room) {
     least = overlap;
     best = relaxation.spheres();
   }
-  largest_overlap_ = std::max(largest_overlap_, least);
   place(movable, best);
 }
 

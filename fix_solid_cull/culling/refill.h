@@ -26,8 +26,6 @@ class Refill {
   /// All that came out in this change, so far, is packed between what is there. False, and nothing happens, if since the last
   /// call nothing came out on any rank. Collective.
   bool pack();
-  /// Largest overlap that was left, as a share of the radii's sum, in all changes on this rank.
-  double largest_overlap() const { return largest_overlap_; }
 
  private:
   void pack(int sweeps, bool look_for_room);
@@ -41,7 +39,6 @@ class Refill {
   StoreExchange& exchange_;
   const StoredSearch& stored_;
   std::vector<std::int64_t> newcomers_;
-  double largest_overlap_ = 0;
 };
 
 }  // namespace solidcull

@@ -139,22 +139,12 @@ INSTANTIATE_TEST_SUITE_P(Beds, Compact,
                                          periodic()),
                          [](const testing::TestParamInfo<Bed>& info) { return info.param.name; });
 
-const char* rain =
-    "lattice sc 0.004\nregion rain block 0.006 0.020 0.006 0.020 0.05 0.065 units box\ncreate_atoms 1 region rain\n"
-    "group rain id > 1300\nset group rain diameter 0.0026\nset group rain density 2500\nvelocity rain set 0 0 -1.0\n";
-
 TEST(CompactScenes, RainOnACompactBedLosesNothing) {
   for (const Bed& b : {bed("compact_rolling"), periodic()}) {
     Engine e;
     e.run(read_bed(b) + compact + "run 300\n");
     ASSERT_GT(f(e, 3), 900);
-    e.run(rain);
-    const std::size_t all = 1300 + 64;
-    for (int k = 0; k < 12; ++k) {
-      e.run("run 250\n");
-      expect_all_there(e, "cull", all);
-      EXPECT_NEAR(f(e, 11), 0, 1e-12 * 0.03) << "mass error";
-    }
+    const std::size_t all = rain_on(e, b);
     EXPECT_GT(f(e, 7), 30) << "restored: the rain wakes what it hits";
     const double interior = f(e, 3);
     e.run("unfix cull\nrun 0\n");
@@ -170,7 +160,7 @@ TEST(CompactScenes, ARestartGoesOnWhereItStopped) {
   Engine straight;
   // 300 steps: the rain has struck and some hundreds have been restored. An order of sums that differs in the last bit, as for
   // some packings, has not grown yet: after 500 more it is 2e-3 d, for what the rain stirs is chaotic
-  straight.run(read_bed(b) + "run 0\n" + rain + compact + "run 400\nwrite_restart compact.restart\nrun 300\n");
+  straight.run(read_bed(b) + "run 0\n" + rain_of_64 + compact + "run 400\nwrite_restart compact.restart\nrun 300\n");
   const std::string from = head(b) + "read_restart compact.restart\nneighbor 0.0004 bin\nneigh_modify delay 0\n" + body(b) +
                            "fix integr all nve/sphere\nthermo 100000\nthermo_modify norm no\n";
   Engine again;

@@ -269,4 +269,19 @@ std::string read_bed(const Bed& bed) {
          "fix integr all nve/sphere\nthermo 100000\nthermo_modify norm no\n";
 }
 
+const char* const rain_of_64 =
+    "lattice sc 0.004\nregion rain block 0.006 0.020 0.006 0.020 0.05 0.065 units box\ncreate_atoms 1 region rain\n"
+    "group rain id > 1300\nset group rain diameter 0.0026\nset group rain density 2500\nvelocity rain set 0 0 -1.0\n";
+
+std::size_t rain_on(Engine& e, const Bed& bed) {
+  e.run(rain_of_64);
+  const std::size_t all = static_cast<std::size_t>(bed.granules) + 64;
+  for (int k = 0; k < 12; ++k) {
+    e.run("run 250\n");
+    expect_all_there(e, "cull", all);
+    EXPECT_NEAR(e.vector("cull", 11), 0, 1e-12 * 0.03) << "mass error";
+  }
+  return all;
+}
+
 }  // namespace decks

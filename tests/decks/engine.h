@@ -77,6 +77,11 @@ std::string body(const Bed& bed);      ///< material, walls, gravity
 std::string read_bed(const Bed& bed);  ///< reads the settled bed (made once, see settled())
 /// A deck up to the first run of a pour into an empty box.
 std::string pouring(const Bed& bed);
+/// 64 granules fall on the bed.
+extern const char* const rain_of_64;
+/// Lets them fall for 3,000 steps, and expects that none is lost, here and in the store of the fix `cull`. How many there are.
+/// Collective.
+std::size_t rain_on(Engine& e, const Bed& bed);
 /// Pours and settles the bed once for all tests of a process and returns the restart file's name. Collective.
 std::string settled(const Bed& bed);
 

@@ -111,23 +111,13 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Refill,
                            return (info.param.exterior == "exterior sleep" ? "sleep_" : "live_") + info.param.bed.name;
                          });
 
-const char* rain =
-    "lattice sc 0.004\nregion rain block 0.006 0.020 0.006 0.020 0.05 0.065 units box\ncreate_atoms 1 region rain\n"
-    "group rain id > 1300\nset group rain diameter 0.0026\nset group rain density 2500\nvelocity rain set 0 0 -1.0\n";
-
 TEST(RefillScenes, RainWakesWhatItHitsAndNothingIsLost) {
   for (const Scene& s : {Scene{"exterior sleep", bed("refill")}, Scene{"exterior live depth 1.5", bed("refill")},
                          Scene{"exterior sleep", periodic()}}) {
     Engine e;
     e.run(read_bed(s.bed) + culling + s.exterior + refill + "run 300\n");
     ASSERT_GT(f(e, 3), 200);
-    e.run(rain);
-    const std::size_t all = 1300 + 64;
-    for (int k = 0; k < 12; ++k) {
-      e.run("run 250\n");
-      expect_all_there(e, "cull", all);
-      EXPECT_NEAR(f(e, 11), 0, 1e-12 * 0.03) << "mass error";
-    }
+    const std::size_t all = rain_on(e, s.bed);
     const double restored = f(e, 7), energy = f(e, 12);
     EXPECT_GT(restored, 30) << "the rain wakes what it hits";
     e.run("unfix cull\nrun 0\n");

@@ -4,8 +4,12 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "validation"))
+from solidcull_runs.engine import environment  # noqa: E402
 
 D = 0.003            # m: the largest diameter of a deck
 TIME_LIMIT = 120     # s for one file of a deck
@@ -13,10 +17,6 @@ AT_REST = 0.02       # m/s: below this mean speed, the end of a run is at rest
 HEIGHT = 0.5         # d: mean heights of two runs at rest may differ by so much
 WEIGHT = 0.1         # of the weight: loads on the floor of two runs at rest
 SLACK = (5, 0.05)    # granules and share: counts that hang on chance
-
-MPI = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_plm_rsh_agent": "",
-       "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMP_NUM_THREADS": "1",
-       "OMPI_MCA_ess_singleton_isolated": "1"}
 
 # the plug-in may refuse these; anything else that it refuses is to be looked at
 REFUSALS = [r"minimize would move atoms only"]
@@ -77,13 +77,12 @@ def run(deck, culled, program, folder, ranks=None):
     for name, text in deck.meshes.items():
         (folder / name).write_text(text)
     end = End()
-    env = {**os.environ, **MPI, **({"SOLIDCULL_CHECK": "1"} if culled else {})}
     for f in range(len(deck.files)):
         (folder / f"deck{f}.in").write_text(deck.text(f, culled))
         n = ranks or deck.ranks[f]
         command = [str(program), "-in", f"deck{f}.in", "-log", f"log{f}", "-screen", f"screen{f}"]
         end.status, end.late, out = run_file((["mpirun", "-np", str(n)] if n > 1 else []) + command, folder,
-                                             {**env, **({"OMPI_MCA_orte_create_session_dirs": "0"} if n == 1 else {})})
+                                             {**environment(n), **({"SOLIDCULL_CHECK": "1"} if culled else {})})
         (folder / f"output{f}").write_text(out)
         log = folder / f"log{f}"
         screen = folder / f"screen{f}"

@@ -29,6 +29,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1] / "validation"))
 from solidcull_runs import meshes  # noqa: E402
+from solidcull_runs.engine import environment  # noqa: E402
 
 DECKS = HERE / "decks"
 RANKS = (1, 2, 4)
@@ -167,13 +168,6 @@ def find_launcher(path):
 
 # --- running ----------------------------------------------------------------------------------------------------------
 
-def environment():
-    return {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1",
-            "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OMPI_MCA_plm_rsh_agent": "",
-            "OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
-            "OMPI_MCA_mpi_yield_when_idle": "1"}
-
-
 def reason_in(screen):
     """The line that says why LIGGGHTS stopped: its own, an exception's, or the last that is not a rule of mpirun's."""
     lines = [line.strip() for line in screen.splitlines() if line.strip("- ")]
@@ -194,7 +188,7 @@ def run_liggghts(name, launcher, deck, folder, variables, ranks=1):
         command += ["-var", variable, str(value)]
     with open(folder / "screen.txt", "w") as out:
         try:
-            status = subprocess.run(command, cwd=folder, env=environment(), stdin=subprocess.DEVNULL, stdout=out,
+            status = subprocess.run(command, cwd=folder, env={**environment(ranks), "OMPI_MCA_mpi_yield_when_idle": "1"}, stdin=subprocess.DEVNULL, stdout=out,
                                     stderr=subprocess.STDOUT, timeout=LONGEST).returncode
         except subprocess.TimeoutExpired:
             raise GoldenError(f"{name}: {deck} ran for more than {LONGEST} s") from None

@@ -14,4 +14,18 @@
 | `few_steps` | what can be checked of a run after a few steps |
 | `tables`, `plots`, `pictures` | text, curves and cut-away pictures |
 | `examples` | the course that all examples take |
+
+What `validation/run.sh` is made of, besides:
+
+| module | what |
+| --- | --- |
+| `validate` | the command |
+| `cases` | what a folder of `cases/` says |
+| `points` | how each case is run: unculled, tolerances, the paper's scheme, by hand |
+| `ensembles` | the runs of a case, and what they gave as plain data |
+| `few` | each deck for a few steps |
+| `equivalence`, `judgement` | two one-sided tests on pairs of runs; verdicts, errors in margins, orders |
+| `fields` | coarse-grained fields and their distance |
+| `moving` | series that several cases measure |
+| `figures`, `report`, `publish` | plots, the page, and what of it is kept with the sources |
 """

@@ -18,15 +18,12 @@ PATIENCE = 5                     # s that a process is given to stop
 
 
 def environment(ranks=1):
-    """Open MPI as root, in a container or bare root, or without mpirun, says nothing and does its work."""
-    env = dict(os.environ)
+    """Open MPI as root, in a container or bare root, or without mpirun, says nothing and does its work. What the user has set stays."""
+    given = re.findall(r"^export (.*?)(?: +#.*)?$", (ROOT / "scripts" / "mpi-env.sh").read_text(), re.M)
+    env = dict(word.split("=", 1) for line in given for word in line.split())
     if ranks == 1:  # programs on one rank share a folder, and one that ends takes it from one that starts
-        env.setdefault("OMPI_MCA_orte_create_session_dirs", "0")
-    for name, value in {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1",
-                        "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OMPI_MCA_ess_singleton_isolated": "1",
-                        "OMPI_MCA_plm_rsh_agent": "", "OMPI_MCA_pml": "ob1"}.items():
-        env.setdefault(name, value)
-    return env
+        env["OMPI_MCA_orte_create_session_dirs"] = "0"
+    return {**env, **os.environ}
 
 
 def find_launcher(named=None):
@@ -41,9 +38,9 @@ def find_launcher(named=None):
 
 
 def hash_of_fix(launcher):
-    """Of the launcher and of the library that holds the fix."""
+    """Of the library that holds the fix; of a launcher that holds it itself."""
     needs = subprocess.run(["ldd", launcher], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout
-    files = [launcher, *re.findall(r"libsolidcull\S* => (/\S+)", needs)]
+    files = re.findall(r"libsolidcull\S* => (/\S+)", needs) or [launcher]
     return hashlib.sha1(b"".join(Path(f).read_bytes() for f in files)).hexdigest()
 
 

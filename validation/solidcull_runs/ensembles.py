@@ -10,7 +10,7 @@ import numpy as np
 from . import decks, dumps, fields
 from .beds import settled
 from .cases import short_hash
-from .engine import POLL, hash_of_fix, stop_all
+from .engine import POLL, stop_all
 from .errors import RunError
 from .logs import FROM_HERE
 from .points import ALSO, BY_HAND, PAPER, UNCULLED, points, runs_of
@@ -305,10 +305,6 @@ def laws_of(case, result, laws):
             for what, value, known in laws(values):
                 rows.setdefault(what, {"known": known, "values": {}})["values"][family] = float(value)
     return [{"what": what, **row} for what, row in rows.items()]
-
-
-def fix_hash(launcher):
-    return hash_of_fix(launcher)
 
 
 def results_file(out, case):

@@ -8,6 +8,11 @@ from .points import UNCULLED
 WORST_FIRST = (equivalence.OTHER, equivalence.OPEN, equivalence.SAME)
 
 
+def worst_of(words):
+    """The worst of some verdicts; None of none."""
+    return next((w for w in WORST_FIRST if w in words), None)
+
+
 @dataclass(frozen=True)
 class Judged:
     """A point of the main scene beside the unculled runs."""
@@ -41,8 +46,7 @@ class Judged:
     @property
     def word(self):
         """Of the metrics' verdicts the worst: all are equivalent, or one is outside, or one is not decided."""
-        words = {v.word for v in self.verdicts.values()}
-        return next(w for w in WORST_FIRST if w in words)
+        return worst_of({v.word for v in self.verdicts.values()})
 
 
 def main_scene(result):

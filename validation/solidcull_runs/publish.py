@@ -5,6 +5,7 @@ import statistics
 from pathlib import Path
 
 from . import judgement
+from .equivalence import OTHER, SAME
 from .errors import RunError
 from .points import LIVE, SLEEP
 from .report import Page, default_of, metric_rows, shown_error
@@ -13,30 +14,27 @@ BEGIN, END = "<!-- made by validation/run.sh --publish -->", "<!-- end -->"
 PICTURES = ("all.png",)  # of the first page
 
 
-def worst_of(result, family):
-    """Of all scenes at the defaults of a mode: the point with the largest error; None where it was not run."""
+def defaults(result, family):
+    """The default point of a mode in each scene in which it was run."""
     found = [default_of(judgement.judge(result, scene), family) for scene in result["scenes"].values()]
-    return max((j for j in found if j), key=lambda j: j.error, default=None)
-
-
-def word_of(result, family):
-    """The verdict on a case: of its scenes the worst."""
-    words = {j.word for scene in result["scenes"].values() if (j := default_of(judgement.judge(result, scene), family))}
-    return next((w for w in judgement.WORST_FIRST if w in words), "not run")
+    return [j for j in found if j]
 
 
 def summary_row(result):
     """A case in the README's table: the time and speed-up of its main scene, the largest error of all."""
     scene = judgement.main_scene(result)
-    judged = judgement.judge(result)
-    if not judged:
+    if not judgement.judge(result):
         raise RunError(f"{result['case']} has too few runs to publish; run it to its end first")
     whole = statistics.median(r["seconds"] for r in judgement.unculled_of(scene)["runs"])
     cells = [f"[{result['case'].replace('_', ' ')}](validation/cases/{result['case']}/README.md)", f"{scene['granules']:,}", f"{whole:.0f} s"]
     for family in (SLEEP, LIVE):
-        j, worst, word = default_of(judged, family), worst_of(result, family), word_of(result, family)
-        cells += [f"{j.speed_up:.1f}", f"{worst.error:.1f}, {word}" if word == judgement.WORST_FIRST[-1] else
-                  f"{shown_error(worst)}, {'**outside**' if word == 'outside' else word}"] if j else ["-", "not run"]
+        points = defaults(result, family)
+        if not points:
+            cells += ["-", "not run"]
+            continue
+        worst, word = max(points, key=lambda j: j.error), judgement.worst_of({j.word for j in points})
+        error = f"{worst.error:.1f}" if word == SAME else shown_error(worst)
+        cells += [f"{points[0].speed_up:.1f}", f"{error}, {'**outside**' if word == OTHER else word}"]
     return cells
 
 

@@ -78,7 +78,7 @@ def run(a):
         return told(failed)
     if not a.report_only:
         launcher = engine.find_launcher()
-        fix = ensembles.fix_hash(launcher)
+        fix = engine.hash_of_fix(launcher)
         beds = ensembles.make_beds(wanted, out, a.at_once, say)
         jobs = {}
         for case in wanted:
