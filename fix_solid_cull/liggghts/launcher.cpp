@@ -16,11 +16,11 @@ void on_signal(int number, void (*handler)(int)) {
   sigaction(number, &action, nullptr);
 }
 
-/// Open MPI starts a daemon for each program that neither mpirun nor srun started, so that it could start others (MPI_Comm_spawn).
-/// LIGGGHTS never does, and on a busy machine the daemon may fail to start, and the run with it. Without one all such programs share
-/// a folder for sockets, which one rank has no use for; one that ends takes it away from one that starts, whose MPI_Init then fails.
-/// Nor does one rank need a network, whose drivers take 0.2 s to measure the processor's clock. Other MPIs do not read this, and
-/// what the user has set stays.
+/// Open MPI starts a daemon for each program that neither mpirun nor srun started, so that it could start others
+/// (MPI_Comm_spawn). LIGGGHTS never does, and on a busy machine the daemon may fail to start, and the run with it. Without one
+/// all such programs share a folder for sockets, which one rank has no use for; one that ends takes it away from one that starts,
+/// whose MPI_Init then fails. Nor does one rank need a network, whose drivers take 0.2 s to measure the processor's clock. Other
+/// MPIs do not read this, and what the user has set stays.
 void alone() {
   for (const char* started_by : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK"}) {
     if (getenv(started_by)) return;
