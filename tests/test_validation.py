@@ -2,6 +2,7 @@
 
 data/validation_result.json is the result of `validation/run.sh --quick slow_impact`, with every eighth point of its curves.
 """
+import collections
 import json
 import math
 import os
@@ -12,6 +13,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
 from pathlib import Path
 
@@ -20,7 +22,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT / "validation"))
-from solidcull_runs import cases, ensembles, equivalence, few, fields, judgement, points, publish, report, validate  # noqa: E402
+from solidcull_runs import cases, ensembles, equivalence, few, fields, judgement, logs, points, publish, report, validate  # noqa: E402
 from solidcull_runs.errors import RunError  # noqa: E402
 
 STORED = ROOT / "tests" / "data" / "validation_result.json"
@@ -126,6 +128,47 @@ class Points(unittest.TestCase):
 
     def test_cut_short(self):
         self.assertEqual(few.cut_short("run 500\nrun ${steps} upto\nrun 0\nrun_time 5\n", 40), "run 40\nrun 40\nrun 0\nrun_time 5\n")
+
+
+Job = collections.namedtuple("Job", "scene point k")
+Family = collections.namedtuple("Family", "family")
+
+
+class Ledger(unittest.TestCase):
+    """Granules that a culled run misses."""
+
+    def runs(self, *given):
+        """Each: family, inserted, ids at the end. Ten granules are there at the start."""
+        done = {}
+        for k, (family, inserted, ids) in enumerate(given):
+            job = Job("", Family(family), k)
+            final = np.array([(i,) for i in ids], [("id", int)])
+            done[job] = types.SimpleNamespace(start=range(10), inserted=inserted, final=final)
+        return done
+
+    def lost(self, *given, refilled=False):
+        return ensembles.lost(self.runs((points.UNCULLED, 5, range(15)), (points.UNCULLED, 3, range(13)), *given),
+                              types.SimpleNamespace(scenes=[""]), refilled)
+
+    def test_what_was_put_in_counts(self):
+        self.assertEqual(self.lost((points.SLEEP, 1, range(11))), 0, "fewer found room; none is lost")
+        self.assertEqual(self.lost((points.SLEEP, 5, range(14))), 1)
+        self.assertEqual(self.lost((points.SLEEP, 3, [*range(13), 12])), -1, "one is there twice")
+
+    def test_what_leaves_unculled_runs_may_leave(self):
+        self.assertEqual(self.lost((points.UNCULLED, 0, range(8)), (points.LIVE, 0, range(8))), 0)
+        self.assertEqual(self.lost((points.UNCULLED, 0, range(8)), (points.LIVE, 0, range(7))), 1)
+        self.assertEqual(self.lost((points.BY_HAND, 0, range(8)), (points.LIVE, 0, range(8))), 2, "what was frozen is no measure")
+
+    def test_the_papers_scheme_is_told_apart(self):
+        given = (points.SLEEP, 0, range(10)), (points.PAPER, 0, range(6))
+        self.assertEqual((self.lost(*given), self.lost(*given, refilled=True)), (0, 4))
+
+    def test_the_log_says_what_was_put_in(self):
+        line = "INFO: Particle insertion {}: inserted 2 particle templates (mass 1) at step 9\n - a total of {} particle templates (mass 2) inserted so far.\n"
+        text = line.format("fill", 100) + f"{logs.FROM_HERE}\n" + line.format("fill", 103) + line.format("feed", 7) + line.format("feed", 9)
+        self.assertEqual(logs.inserted(text), 3 + 9)
+        self.assertEqual(logs.inserted("no line\n"), 0)
 
 
 class Statistics(unittest.TestCase):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import decks, dumps, fields
+from . import decks, dumps, fields, logs
 from .beds import settled
 from .cases import short_hash
 from .engine import POLL, stop_all
@@ -47,6 +47,7 @@ class CaseJob(KeptJob):
 
     def measured(self, run):
         run.start = dumps.read_final(self.file(".start"))
+        run.inserted = logs.inserted(self.file(".log").read_text(errors="replace"))
         return self.case.measured(run, self.scene)
 
     def text(self):
@@ -234,7 +235,7 @@ def result_of(case, done):
     """What the runs of a case gave. `done`: as from run_all(), of this case's jobs."""
     result = {"case": case.name, "title": case.title, "claim": case.claim, "reference": case.reference, "size": case.size,
               "metrics": [{"name": m.name, "unit": m.unit, "margin": m.margin, "relative": m.relative, "why": m.why} for m in case.metrics],
-              "scenes": {}, "failed": [], "bound": None, "fields": {}, "laws": [], "lost": 0}
+              "scenes": {}, "failed": [], "bound": None, "fields": {}, "laws": [], "lost": 0, "lost_refilled": 0}
     for scene in case.scenes:
         of_scene = {}
         for job, run in done.items():
@@ -253,7 +254,7 @@ def result_of(case, done):
         if len(set(values)) < len(values):
             result["failed"].append({"run": "unculled", "point": UNCULLED, "why": f"unculled runs are alike: '{case.need('aside')}' moves "
                                      "nothing, as with '-${aside}', or a mesh whose fix ID is in the restart file"})
-    result["lost"] = lost(done, case)
+    result["lost"], result["lost_refilled"] = lost(done, case), lost(done, case, refilled=True)
     main = {job: run for job, run in done.items() if job.scene == case.main_scene and not isinstance(run, str)}
     finals = {}
     for job, run in main.items():
@@ -276,18 +277,24 @@ def result_of(case, done):
     return result
 
 
-def lost(done, case):
-    """Granules that culled runs miss at the end, beside unculled ones of the same scene; the most of any run."""
+def lost(done, case, refilled=False):
+    """Granules that culled runs miss at the end, of those that were there and those that were put in, but for as many as leave
+    unculled runs of the same scene; the most of any run. Below 0: there twice. Of the paper's scheme (`refilled`) or of all others."""
     worst = 0
     for scene in case.scenes:
-        runs = {kind: [r for j, r in done.items() if j.scene == scene and j.kind == kind and not isinstance(r, str) and r.final is not None]
-                for kind in ("unculled", "culled")}
-        if not runs["unculled"]:
-            continue
-        numbers = [len(r.final) for r in runs["unculled"]]
-        for r in runs["culled"]:
-            due = max(min(numbers), min(max(numbers), len(r.final)))
-            worst = max(worst, due - len(r.final) + len(r.final) - len(np.unique(r.final["id"])), key=abs)
+        leave, missing = [], []
+        for job, run in done.items():
+            family = job.point.family
+            if job.scene != scene or family == BY_HAND or isinstance(run, str) or run.final is None:
+                continue
+            there = len(np.unique(run.final["id"]))
+            if family == UNCULLED:
+                leave.append(len(run.start) + run.inserted - there)
+            elif (family == PAPER) == refilled:
+                missing.append(len(run.start) + run.inserted - there)
+                worst = max(worst, there - len(run.final), key=abs)
+        for n in missing if leave else ():
+            worst = max(worst, n - max(min(leave), min(max(leave), n)), key=abs)
     return int(worst)
 
 

@@ -69,6 +69,16 @@ def loop_time(tables):
     return sum(t.loop_time or 0 for t in tables if t.counted)
 
 
+def inserted(text):
+    """How many granules the insertion fixes of a deck put in behind its solid/cull line."""
+    before, _, behind = text.partition(f"\n{FROM_HERE}\n")
+
+    def totals(part):
+        return {m[1]: int(m[2]) for m in re.finditer(r"Particle insertion (\S+): inserted .*\n - a total of (\d+) particle templates", part)}
+    then = totals(before)
+    return sum(total - then.get(fix, 0) for fix, total in totals(behind).items())
+
+
 def series(tables, name):
     """Steps and values of a thermo column, from the counted tables. The row that a run prints before its first step is
     left out where the run before it has printed that step: LIGGGHTS counts mesh loads twice there."""
