@@ -128,6 +128,7 @@ void Culling::initial_step() {
   const std::int64_t step = p_.ports.run.step;
   if (p_.ports.ranks.any(p_.wake.any_here())) ask_for_build(step);
   p_.pacing.begin_run(step, p_.census.something_locked());
+  if (p_.pacing.looks_at_once()) look_at_once();
   if (p_.ports.ranks.any(proposal_dropped_)) p_.pacing.look_earlier(step);
   proposal_dropped_ = false;
 }

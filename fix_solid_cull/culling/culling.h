@@ -86,6 +86,7 @@ class Culling {
   void take_loads();
   void collect_wakes();
   void look();
+  void look_at_once();
   Proposal survey(bool may_cull, bool any_culled);
   void ground_and_press();
   void judge(bool may_cull, const Proposal& proposal);

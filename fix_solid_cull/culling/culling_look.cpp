@@ -33,6 +33,16 @@ void Culling::look() {
   p_.pacing.schedule(step, p_.census.something_locked(), p_.census.something_stored());
 }
 
+/// Before the first step of a run in which nothing is culled.
+void Culling::look_at_once() {
+  const auto timed = p_.report.time(Part::look);
+  const std::int64_t step = p_.ports.run.step;
+  check_numbers(p_.ports.atoms);
+  proposal_ = survey(true, false);
+  p_.pacing.has_looked_at_once();
+  if (p_.ports.ranks.any(!proposal_.chosen.empty())) ask_for_build(step);
+}
+
 /// What is to be culled; what is exposed, or stands at walls that hold it, is seen on the way.
 Proposal Culling::survey(bool may_cull, bool any_culled) {
   const Patience patience = p_.pacing.patience(p_.census.something_locked());

@@ -12,9 +12,12 @@ namespace solidcull {
 
 /// How many looks a granule must be calm for, and how much motion is rest: in the first looks of a run less of both.
 struct Patience {
-  bool quick;            ///< one of the quick looks at the start of a run
-  int looks;             ///< in a row
-  double speed_divisor;  ///< of the solid-state speed: over a shorter time less motion tells it from rest
+  bool quick;                ///< one of the quick looks at the start of a run
+  int looks;                 ///< in a row; 1: this one decides alone
+  double speed_divisor;      ///< of the solid-state speed: over a shorter time less motion tells it from rest
+  double force_divisor = 1;  ///< likewise of the out-of-balance force
+
+  bool at_once() const { return looks == 1 && quick; }
 };
 
 /// What was counted between two looks, over all ranks.
@@ -33,7 +36,8 @@ class Pacing {
   /// A run begins at this step, with something culled or not.
   void begin_run(std::int64_t step, bool something_locked) {
     next_look_ = ((step - 1) / every() + 1) * every();
-    if (!something_locked && !scales_.settings().every) {
+    looks_at_once_ = !something_locked && !scales_.settings().every;
+    if (looks_at_once_) {
       quick_looks_ = scales_.settings().calm;
       if (last_look_ >= step) last_look_ = INT32_MIN;  // time was set back
       next_look_ = std::max(step, last_look_ + quick_interval());
@@ -54,9 +58,13 @@ class Pacing {
   /// A load change of so many tolerances does not wait: what it strikes would stand like a rock until then.
   static constexpr double blow = 10;
 
+  /// The first look comes before the first step: a bed that was read at rest is culled by its velocities and forces alone.
+  bool looks_at_once() const { return looks_at_once_; }
+  void has_looked_at_once() { looks_at_once_ = false; }
   bool due(std::int64_t step) const { return step == next_look_; }
   bool may_cull(std::int64_t step) const { return step >= no_cull_until_; }
   Patience patience(bool something_locked) const {
+    if (looks_at_once_) return {true, 1, at_once_speed, at_once_force};
     const bool quick = quick_looks_ > 0 && !something_locked;
     const int calm = scales_.settings().calm;
     return quick ? Patience{true, std::min(calm, quick_calm), quick_rate} : Patience{false, calm, 1};
@@ -154,6 +162,8 @@ class Pacing {
   static constexpr int looks_between_glances = 15;
   // the first looks of a run, until something is culled, come this many times as often; so many in a row are enough of them
   static constexpr int quick_rate = 5, quick_calm = 3;
+  // a look that decides alone asks for far less motion and imbalance: what a bed has that was saved at rest is less still
+  static constexpr double at_once_speed = 25, at_once_force = 15;
 
   // waking granules are handled together after about so many steps: a sound wave crosses one or two granules in that time
   static constexpr int wake_together = 20;
@@ -166,6 +176,7 @@ class Pacing {
 
   const Scales& scales_;
   std::int64_t next_look_ = -1, last_look_ = INT32_MIN;
+  bool looks_at_once_ = false;
   int quick_looks_ = 0;  // left at the start of a run in which nothing is culled yet
   std::int64_t no_cull_until_ = -1;
   int pause_ = 0;           // looks that culling waits after a body woke as a whole; doubles while that goes on

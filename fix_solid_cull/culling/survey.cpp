@@ -161,6 +161,7 @@ bool Survey::is_solid(int i, const Seen& seen, const SolidStateLaw& law) {
 std::int64_t Survey::find_calm(const Patience& patience, Proposal& proposal) {
   SolidStateLaw law = scales_.solid_state();
   law.speed /= patience.speed_divisor;
+  law.force /= patience.force_divisor;
   const Seen seen = see_contacts(law);
   std::int64_t candidates = 0;
   for (int i = 0; i < ports_.atoms.owned; ++i) {
@@ -244,7 +245,7 @@ void Survey::leave_out_unsteady(const Patience& patience, Proposal& proposal) {
   }
   const std::vector<char> steady = find_steady(asked);
   for (int i = 0; i < atoms.owned; ++i) {
-    if (!asked[i] || steady[i]) continue;
+    if (!asked[i] || steady[i] || patience.at_once()) continue;  // one look alone knows no change
     if (live)
       chosen.erase(atoms.tag[i]);
     else
