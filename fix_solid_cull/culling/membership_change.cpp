@@ -26,7 +26,8 @@ void MembershipChange::free_and_lock() {
 void MembershipChange::lock(int i) {
   Atoms& atoms = p_.ports.atoms;
   p_.shell.lock(atoms, i, p_.ports.run.step, p_.survey[i].normal_load, p_.scales.sleeping() && p_.walls[i].stands);
-  p_.survey.begin_anew(i);
+  const Survey::Rested rested = p_.survey.rests(i);
+  if (rested != Survey::Rested::first_time) p_.solid.count_locked_again(rested == Survey::Rested::moved);
   if (!p_.scales.rigid()) {
     atoms.set_velocity(i, Vec3::Zero());
     if (p_.ports.contacts.turn_granules) atoms.set_spin(i, Vec3::Zero());
@@ -36,7 +37,7 @@ void MembershipChange::lock(int i) {
 
 void MembershipChange::unlock(int i) {
   p_.shell.unlock(p_.ports.atoms, i);
-  p_.survey.begin_anew(i);
+  p_.survey.wakes(i);
   p_.closure.unlocked(i);
 }
 

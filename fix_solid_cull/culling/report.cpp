@@ -6,7 +6,7 @@
 namespace solidcull {
 
 double Report::value(int n) {
-  if (n < 0 || n >= counts + carried + of_all) return 0;
+  if (n < 0 || n >= size) return 0;
   if (totals_step_ != ports_.run.step || totals_version_ != membership_version_) {
     totals_.clear();
     carried_.clear();
@@ -16,6 +16,7 @@ double Report::value(int n) {
   totals_version_ = membership_version_;
   if (totals_.empty()) count_totals();
   if (n < counts) return totals_[n];
+  if (n >= counts + carried + of_all) return rests_again_[n - counts - carried - of_all];
   if (n < counts + carried) {
     if (carried_.empty()) sum_carried();
     return carried_[n - counts];
@@ -30,7 +31,7 @@ void Report::count_totals() {
   for (int i = 0; i < ports_.atoms.owned; ++i) interface_granules += shell_[i].locked;
   const Ledger& ledger = solid_.ledger();
   const bool open = solid_.has_store();
-  double sums[9] = {ports_.atoms.owned - interface_granules,
+  double sums[11] = {ports_.atoms.owned - interface_granules,
                     interface_granules,
                     open ? static_cast<double>(solid_.store().size()) : 0.0,
                     bodies,
@@ -38,12 +39,15 @@ void Report::count_totals() {
                     static_cast<double>(ledger.granules_locked()),
                     static_cast<double>(ledger.granules_restored()),
                     open ? ledger.mass_error(solid_.store()) : 0.0,
-                    ledger.energy_added()};
-  ports_.ranks.sum(sums, 9);
+                    ledger.energy_added(),
+                    static_cast<double>(ledger.granules_locked_again()),
+                    static_cast<double>(ledger.granules_that_moved())};
+  ports_.ranks.sum(sums, 11);
   double largest[2] = {motion_.largest_excess(), watch_.total()};
   ports_.ranks.largest(largest, 2);
   totals_ = {sums[0],    sums[1],    sums[2], sums[3], sums[4], sums[5], sums[6], static_cast<double>(ledger.carves()),
              largest[0], largest[1], sums[7], sums[8]};
+  rests_again_ = {sums[9], sums[10]};
 }
 
 /// What interior granules carry, so that a deck can add it to what its atoms have: momentum, angular momentum about the origin,
@@ -105,8 +109,9 @@ void Report::tell_run() {
   char text[512];
   std::snprintf(text, sizeof text,
                 "%.0f exterior, %.0f interface, %.0f interior granules in %.0f bodies; culled %.0f, restored %.0f, "
-                "carves %.0f; mass error %.3g kg, energy added %.3g J",
-                totals_[0], totals_[1], totals_[2], totals_[3], totals_[5], totals_[6], totals_[7], totals_[10], totals_[11]);
+                "carves %.0f; mass error %.3g kg, energy added %.3g J; %.0f culled again, %.0f had moved",
+                totals_[0], totals_[1], totals_[2], totals_[3], totals_[5], totals_[6], totals_[7], totals_[10], totals_[11],
+                rests_again_[0], rests_again_[1]);
   ports_.run.say(text);
   double total = 0;
   std::string each;

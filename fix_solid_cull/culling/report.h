@@ -1,6 +1,7 @@
 // What the run is told: f_ID, f_ID[...], and two lines at the end of each run.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -18,6 +19,8 @@ class Report {
   static constexpr int counts = 12;   ///< f_ID[1..12]
   static constexpr int carried = 10;  ///< after them: what interior granules carry
   static constexpr int of_all = 6;    ///< and what all granules have together
+  static constexpr int again = 2;     ///< how many were culled again, and how many of them had moved
+  static constexpr int size = counts + carried + of_all + again;
   static constexpr int interior = 2;  ///< index of f_ID itself among them
 
   Report(const Ports& ports, const Solid& solid, const Shell& shell, const BodyGroups& groups, const BodyMotion& motion)
@@ -43,6 +46,7 @@ class Report {
   const BodyGroups& groups_;
   const BodyMotion& motion_;
   StopWatch watch_;
+  std::array<double, again> rests_again_{};
   std::vector<double> totals_, carried_, all_;  // as of:
   std::int64_t totals_step_ = -1, totals_version_ = -1;
   std::int64_t membership_version_ = 0;

@@ -12,7 +12,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261125;  // the format's version
+constexpr double file_mark = 20261126;  // the format's version
 /// The numbers before the ranks' parcels. A check sum follows them.
 enum Header {
   mark,
@@ -22,7 +22,7 @@ enum Header {
   gravity,
   gravity_x,
   counters = gravity_x + 3,
-  width = counters + 4,
+  width = counters + Ledger::counters_size,
   ranks,
   step,
   no_places,
@@ -52,10 +52,10 @@ std::vector<double> Snapshot::write() {
       if (shell_[i].locked) interface_tags.push_back(ports_.atoms.tag[i]);
     mine = parcels_.pack(stored, interface_tags, true);
   }
-  std::array<double, 4> sums = solid_.ledger().counters();
-  const double carves = sums[2];
-  ports_.ranks.sum(sums.data(), 4);
-  sums[2] = carves;  // every rank counts every carve
+  Ledger::Counters sums = solid_.ledger().counters();
+  const double carves = sums[Ledger::carves_counter];
+  ports_.ranks.sum(sums.data(), Ledger::counters_size);
+  sums[Ledger::carves_counter] = carves;
   std::int64_t in_file[2] = {static_cast<std::int64_t>(mine.size()), static_cast<std::int64_t>(stored.size())};
   ports_.ranks.sum(in_file, 2);
   const std::int64_t size = in_file[0] + 1 + header_size + static_cast<std::int64_t>(check_sum_size);
@@ -75,7 +75,7 @@ std::vector<double> Snapshot::write() {
   h[diameter] = scales_.diameter();
   h[gravity] = scales_.gravity();
   set(h + gravity_x, gravity_.at_last_look());
-  std::copy_n(sums.begin(), 4, h + counters);
+  std::copy(sums.begin(), sums.end(), h + counters);
   h[width] = static_cast<double>(solid_.contacts().width());
   h[ranks] = ports_.ranks.count;
   h[step] = static_cast<double>(ports_.run.step);
@@ -113,8 +113,10 @@ void Snapshot::read(const std::vector<double>& state) {
   const std::int64_t then = static_cast<std::int64_t>(h[step]);
   ports_.run.reset_by += ports_.run.step - then;
   ports_.run.step = then;
-  const bool first = ports_.ranks.me == 0;
-  solid_.set_counters({first ? h[counters] : 0, first ? h[counters + 1] : 0, h[counters + 2], first ? h[counters + 3] : 0});
+  Ledger::Counters counted{};
+  for (int k = 0; k < Ledger::counters_size; ++k)
+    if (ports_.ranks.me == 0 || k == Ledger::carves_counter) counted[k] = h[counters + k];
+  solid_.set_counters(counted);
 
   // the neighbour cut-off is set before the store is taken up: it must know the largest stored radius
   for (const Parcel& p : parcels_.unpack(h + header_size, state_.size() - header_size, static_cast<std::size_t>(h[width])))

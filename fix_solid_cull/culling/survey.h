@@ -26,12 +26,16 @@ struct AtRest {
   Vec3 velocity = Vec3::Zero();  ///< then (m/s)
   Vec3 acceleration_around = Vec3::Zero();  ///< of what it touched then (m/s^2)
   double normal_load = Locked::not_known;   ///< sum of normal contact forces at the last look (N)
+  bool woken = false;                       ///< it was culled, and is free again:
+  Vec3 woke_at = Vec3::Zero();              ///< where it was then (m)
 
-  static constexpr int packed_size = 10;
+  static constexpr int packed_size = 14;
   void pack(double* to) const {
-    const double values[packed_size] = {
-        double(calm),           double(waited),         double(since),          velocity[0], velocity[1], velocity[2],
-        acceleration_around[0], acceleration_around[1], acceleration_around[2], normal_load};
+    const double values[packed_size] = {double(calm),           double(waited),         double(since),
+                                        velocity[0],            velocity[1],            velocity[2],
+                                        acceleration_around[0], acceleration_around[1], acceleration_around[2],
+                                        normal_load,            double(woken),          woke_at[0],
+                                        woke_at[1],             woke_at[2]};
     std::copy_n(values, packed_size, to);
   }
   static AtRest unpack(const double* v) {
@@ -42,6 +46,8 @@ struct AtRest {
     r.velocity = vec(v + 3);
     r.acceleration_around = vec(v + 6);
     r.normal_load = v[9];
+    r.woken = v[10] != 0;
+    r.woke_at = vec(v + 11);
     return r;
   }
 };
@@ -54,10 +60,20 @@ class Survey {
 
   const AtRest& operator[](int i) const { return rows_[i]; }
   PerGranule<AtRest>& rows() { return rows_; }
-  /// It was locked, or unlocked.
-  void begin_anew(int i) {
-    rows_[i].calm = rows_[i].waited = 0;
-    rows_[i].normal_load = Locked::not_known;
+  /// Owned granule i is free again.
+  void wakes(int i) {
+    begin_anew(i);
+    rows_[i].woken = true;
+    rows_[i].woke_at = ports_.atoms.place(i);
+  }
+  /// It is locked; if it had been before: whether it has moved by more than d/100 since, where nothing carries it along.
+  enum class Rested { first_time, unmoved, moved };
+  Rested rests(int i) {
+    begin_anew(i);
+    if (!rows_[i].woken) return Rested::first_time;
+    rows_[i].woken = false;
+    const Vec3 way = solid_.nearest_image(ports_.atoms.place(i), rows_[i].woke_at) - rows_[i].woke_at;
+    return way.norm() > moved_share * scales_.diameter() ? Rested::moved : Rested::unmoved;
   }
 
   // --- a look, in this order
@@ -81,10 +97,16 @@ class Survey {
   std::int64_t exterior_here() const;
 
  private:
+  static constexpr double moved_share = 0.01;  // of d
+
   struct Pair {
     int i, j;
   };
   struct Seen;
+  void begin_anew(int i) {
+    rows_[i].calm = rows_[i].waited = 0;
+    rows_[i].normal_load = Locked::not_known;
+  }
   std::vector<Vec3> accelerations() const;
   Seen see_contacts(const SolidStateLaw& law) const;
   bool is_solid(int i, const Seen& seen, const SolidStateLaw& law);

@@ -58,7 +58,7 @@ FixSolidCull::~FixSolidCull() {
 void FixSolidCull::publish_flags() {
   scalar_flag = 1;
   vector_flag = 1;
-  size_vector = Report::counts + Report::carried + Report::of_all;
+  size_vector = Report::size;
   global_freq = 1;
   extscalar = 1;
   extvector = 0;

@@ -159,12 +159,13 @@ class Solid {
 
   // --- the ledger
   void count_locked() { ledger_.locked(); }
+  void count_locked_again(bool moved) { ledger_.locked_again(moved); }
   void count_restored(double energy) { ledger_.restored(energy); }
   void count_refilled(double energy) { ledger_.refilled(energy); }
   void count_carves(std::size_t n) {
     for (; n > 0; --n) ledger_.carved();
   }
-  void set_counters(const std::array<double, 4>& c) { ledger_.set_counters(c); }
+  void set_counters(const Ledger::Counters& c) { ledger_.set_counters(c); }
 
   /// Gives memory back that was needed once; returns how many bytes.
   std::size_t fit();
