@@ -40,9 +40,30 @@ TEST(Pacing, a_run_begins_with_quick_looks_and_goes_on_at_multiples_of_the_inter
   EXPECT_EQ(deck.looks(1, 70), (Steps{1, 6, 11, 16, 21, 32, 48, 64}));
 }
 
+TEST(Pacing, the_first_look_decides_alone_and_asks_for_the_least_motion) {
+  Deck deck;
+  deck.pacing.begin_run(1, false);
+  ASSERT_TRUE(deck.pacing.looks_at_once());
+  const Patience first = deck.pacing.patience(false);
+  EXPECT_TRUE(first.at_once());
+  EXPECT_EQ(first.looks, 1);
+  deck.pacing.has_looked_at_once();
+  const Patience next = deck.pacing.patience(false);
+  EXPECT_FALSE(next.at_once());
+  EXPECT_GT(first.speed_divisor, next.speed_divisor);
+  EXPECT_GT(first.force_divisor, next.force_divisor);
+  EXPECT_EQ(next.force_divisor, 1);
+  for (const bool named : {true, false}) {
+    Deck other(named ? 10 : 0);
+    other.pacing.begin_run(1, !named);  // where the user names the interval, or something is culled already
+    EXPECT_FALSE(other.pacing.looks_at_once());
+  }
+}
+
 TEST(Pacing, quick_looks_ask_for_less_calm_and_less_motion) {
   Deck deck;
   deck.pacing.begin_run(1, false);
+  deck.pacing.has_looked_at_once();
   const Patience quick = deck.pacing.patience(false);
   EXPECT_TRUE(quick.quick);
   EXPECT_EQ(quick.looks, 3);
@@ -70,6 +91,7 @@ TEST(Pacing, no_quick_looks_where_the_user_names_the_interval_or_something_is_cu
 TEST(Pacing, a_look_in_time_for_what_is_culled_at_the_end_of_the_quick_ones) {
   Deck deck;
   deck.pacing.begin_run(1, false);
+  deck.pacing.has_looked_at_once();
   ASSERT_TRUE(deck.pacing.due(1));
   deck.pacing.schedule(1, true, false);  // something was locked: no more quick ones
   EXPECT_TRUE(deck.pacing.due(16));
