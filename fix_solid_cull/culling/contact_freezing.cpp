@@ -162,15 +162,14 @@ void ContactFreezing::rebase_thawed() {
   const Atoms& atoms = ports_.atoms;
   const int owned = atoms.owned;
   ports_.contacts.neighbours().for_each_pair(owned, [&](int i, int j, int k) {
-    const bool freed = thawed_.contains(atoms.tag[i]), other_freed = thawed_.contains(atoms.tag[j]);
-    const bool stays = shell_[i].locked && !shell_[i].fresh;
-    const bool other_stays = j < owned && shell_[j].locked && !shell_[j].fresh;
-    if (!(stays && other_freed) && !(freed && other_stays)) return;
+    const bool stays = shell_[i].locked && !shell_[i].fresh && thawed_.contains(atoms.tag[j]);
+    const bool other_stays = j < owned && shell_[j].locked && !shell_[j].fresh && thawed_.contains(atoms.tag[i]);
+    if (!stays && !other_stays) return;
     const double reach = (atoms.radius[i] + atoms.radius[j]) * ports_.contacts.reach_factor;
     if ((atoms.place(i) - atoms.place(j)).squaredNorm() > reach * reach) return;
     const Vec3 f = ports_.contacts.force_on_first(i, k);
-    if (stays && other_freed) shell_.rebase(i, f);
-    if (freed && other_stays) shell_.rebase(j, -f);
+    if (stays) shell_.rebase(i, f);
+    if (other_stays) shell_.rebase(j, -f);
   });
   thawed_.clear();
 }

@@ -312,13 +312,14 @@ void Survey::tie(Proposal& proposal) {
   const Atoms& atoms = ports_.atoms;
   const int owned = atoms.owned;
   FlatMap<char> chosen = set_of(proposal.chosen);
-  const auto will_be_locked = [&](int i) { return atoms.is_interface(i) || i >= owned || chosen.contains(atoms.tag[i]); };
+  std::vector<char> will_be_locked(static_cast<std::size_t>(owned + atoms.ghosts), 1);
+  for (int i = 0; i < owned; ++i) will_be_locked[i] = atoms.is_interface(i) || chosen.contains(atoms.tag[i]);
   std::vector<char> touching(static_cast<std::size_t>(owned), 0), goes_along(static_cast<std::size_t>(owned), 0);
   ports_.contacts.neighbours().for_each_pair(owned, [&](int i, int j, int k) {
     const double radii = atoms.radius[i] + atoms.radius[j];
     const double distance = (atoms.place(i) - atoms.place(j)).norm();
     if (distance > radii * (1 + SolidStateLaw::gap)) return;
-    const bool first = will_be_locked(i), second = will_be_locked(j);
+    const bool first = will_be_locked[i], second = will_be_locked[j];
     const bool bears = distance <= radii * ports_.contacts.reach_factor;
     if (!bears && scales_.solid_state().spins_beside(state_of(atoms, i), state_of(atoms, j))) return;
     if (first && second) proposal.touches.push_back({atoms.tag[i], atoms.tag[j]});
