@@ -20,8 +20,8 @@ struct Output {
 
 struct Settings {
   int every = 0;       ///< steps between looks; 0: from the deck's own scales, see look_interval()
-  double depth = 2.0;  ///< cover, in mean granule diameters: below the outer surface (live), around what moves (sleep)
-  Exterior exterior = Exterior::live;
+  double depth = 0.0;  ///< cover, in mean granule diameters: below the outer surface (live), around what moves (sleep)
+  Exterior exterior = Exterior::sleep;
   double speed = 0.01;            ///< solid-state tolerance, fraction of sqrt(g d)
   int calm = 4;                   ///< looks in a row
   double tolerance_absolute = 3;  ///< A of the wake-up law, in granule weights

@@ -69,8 +69,8 @@ TEST(Settings, a_sleeping_surface_needs_no_cover) {
 TEST(Settings, without_keywords_are_the_defaults) {
   const Settings s = parsed("");
   EXPECT_EQ(s.every, 0);
-  EXPECT_EQ(s.depth, 2.0);
-  EXPECT_EQ(s.exterior, Exterior::live);
+  EXPECT_EQ(s.depth, 0.0);
+  EXPECT_EQ(s.exterior, Exterior::sleep);
   EXPECT_EQ(s.speed, 0.01);
   EXPECT_EQ(s.calm, 4);
   EXPECT_EQ(s.tolerance_absolute, 3.0);
