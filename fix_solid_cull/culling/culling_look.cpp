@@ -26,7 +26,7 @@ void Culling::look() {
   p_.ports.ranks.sum(in_bodies, 2);
   p_.pacing.see_waking_bodies(in_bodies[0], in_bodies[1], step);
   if (p_.pacing.waits_for_calm(step)) p_.pacing.see_energy(p_.survey.kinetic_energy_of_exterior(), step);
-  const bool may_cull = p_.pacing.may_cull(step);
+  const bool may_cull = p_.pacing.may_cull(step) && !p_.gravity.turns();
   if (may_cull || any_culled) see_walls(false);
   proposal_ = survey(may_cull, any_culled);
   judge(may_cull, proposal_);

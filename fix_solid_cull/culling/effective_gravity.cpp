@@ -16,7 +16,7 @@ void EffectiveGravity::watch_bodies(bool at_once) {
   if (g != gravity_then_)  // what stands still feels gravity alone
     for (const auto& [number, b] : solid_.bodies().bodies())
       if (b.grounded && scales_.wake_up().gravity_changed(b.pose.turned_to_frame(g), b.felt_known ? b.felt : gravity_then_,
-                                                          static_cast<double>(b.mass.count)))
+                                                          static_cast<double>(b.mass.count), turns_))
         wake_.ask_body(groups_.key_of(number));
   for (const ActiveBody& a : motion_.active()) watch(a, g, at_once);
 }
@@ -32,7 +32,7 @@ void EffectiveGravity::watch(const ActiveBody& a, const Vec3& g, bool at_once) {
   };
   if (!scales_.rigid()) {
     b.feel_first(g);
-    wakes_if(law.gravity_changed(g, b.felt, granules));
+    wakes_if(law.gravity_changed(g, b.felt, granules, turns_));
     return;
   }
   if (b.grounded) {
@@ -40,7 +40,7 @@ void EffectiveGravity::watch(const ActiveBody& a, const Vec3& g, bool at_once) {
     return;
   }
   if (at_once) {
-    wakes_if(b.felt_known && law.gravity_changed(b.pose.turned_to_frame(g - b.acceleration), b.felt, granules));
+    wakes_if(b.felt_known && law.gravity_changed(b.pose.turned_to_frame(g - b.acceleration), b.felt, granules, turns_));
     b.begin_window(now);
     return;
   }
@@ -53,7 +53,7 @@ void EffectiveGravity::watch(const ActiveBody& a, const Vec3& g, bool at_once) {
   if (steps < window) return;
   b.end_window(steps * ports_.run.dt);
   const Vec3 feels = b.pose.turned_to_frame(g - b.acceleration);
-  wakes_if(b.felt_known && law.gravity_changed(feels, b.felt, granules));
+  wakes_if(b.felt_known && law.gravity_changed(feels, b.felt, granules, turns_));
   b.feel_first(feels);
   b.begin_window(now);
 }

@@ -18,18 +18,29 @@ class EffectiveGravity {
 
   /// At each look.
   void watch() {
+    see_turn();
     watch_bodies(false);
     gravity_then_ = ports_.run.gravity();
   }
   /// At the start of a run: the deck may have changed gravity, all at once.
   void begin_run() {
+    see_turn();
     if (ports_.run.gravity() != gravity_then_) watch_bodies(true);
     gravity_then_ = ports_.run.gravity();
   }
+  /// The deck's gravity had another direction at the last look. A bed that is tilted yields in many small slips, each slow at
+  /// first: none of it is solid until the tilting ends.
+  bool turns() const { return turns_; }
   const Vec3& at_last_look() const { return gravity_then_; }               ///< m/s^2
   void set_at_last_look(const Vec3& gravity) { gravity_then_ = gravity; }  ///< as a restart file has it
 
  private:
+  static constexpr double same_direction = 1e-9;  // sine
+
+  void see_turn() {
+    const Vec3 g = ports_.run.gravity();
+    turns_ = g.cross(gravity_then_).norm() > same_direction * g.norm() * gravity_then_.norm();
+  }
   void watch_bodies(bool at_once);
   void watch(const ActiveBody& a, const Vec3& g, bool at_once);
 
@@ -40,6 +51,7 @@ class EffectiveGravity {
   const BodyGroups& groups_;
   WakeRequests& wake_;
   Vec3 gravity_then_ = Vec3::Zero();  // at the last look
+  bool turns_ = false;
 };
 
 }  // namespace solidcull

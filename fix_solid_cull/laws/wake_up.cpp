@@ -9,14 +9,15 @@ double WakeUpLaw::excess(const Vec3& load, const Vec3& load_at_locking, double m
   return (load - load_at_locking).norm() / tolerance(mass, normal_load);
 }
 
-bool WakeUpLaw::gravity_changed(const Vec3& now, const Vec3& at_locking, double granules) const {
+bool WakeUpLaw::gravity_changed(const Vec3& now, const Vec3& at_locking, double granules, bool turns) const {
   const double scale = gravity * std::clamp(small_body / granules, 1.0, 10.0);
   const Vec3 change = now - at_locking;
   const double before = at_locking.norm();
   // where nothing was felt there is no direction to change
   const double along = before > size_share * scale ? change.dot(at_locking) / before : change.norm();
   const double across = std::sqrt(std::max(0.0, change.squaredNorm() - along * along));
-  return across > (direction_share * absolute + relative) * scale || std::abs(along) > (size_share * absolute + relative) * scale;
+  const double direction = (direction_share * absolute + relative) * (turns ? turning_share : 1.0);
+  return across > direction * scale || std::abs(along) > (size_share * absolute + relative) * scale;
 }
 
 double WakeUpLaw::radius(double excess) const {

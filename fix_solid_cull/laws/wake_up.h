@@ -17,6 +17,7 @@ struct WakeUpLaw {
   static constexpr double growth = 0.5;  ///< c of the carve law
   static constexpr double direction_share = 1.0 / 120,
                           size_share = 1.0 / 12;  ///< for A = 1: 2.5 % and 25 % at the default tolerance
+  static constexpr double turning_share = 0.1;  ///< of the direction's share, where the deck turns gravity
   static constexpr double small_body = 300;       ///< granules: below, the shares grow, tenfold at most
 
   static constexpr double own_share = 0.5, least_share = 0.15;
@@ -36,7 +37,8 @@ struct WakeUpLaw {
   /// Effective gravity (g less the body's acceleration, in the body's frame) against what it was at locking: beyond a share of
   /// |g| the whole body wakes. Direction counts ten times as much as size, for what a packing bears depends on the direction of
   /// its load. A body of a few granules has all of them at its shell, where each one's own load is watched: its share is larger.
-  bool gravity_changed(const Vec3& now, const Vec3& at_locking, double granules) const;
+  /// Where gravity itself turns, a tenth of the change in direction is enough.
+  bool gravity_changed(const Vec3& now, const Vec3& at_locking, double granules, bool turns = false) const;
 
   /// Radius (m) of the ball that a waking granule carves: r0 (1 + c log2(excess)), at most cap r0. excess >= 1.
   double radius(double excess) const;

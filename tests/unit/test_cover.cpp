@@ -17,7 +17,7 @@ constexpr double apart = 0.999 * 2 * r;
 struct Cube {
   static constexpr int n = 7;
 
-  explicit Cube(const SmallDeck& deck = empty_space(), const Settings& settings = Settings(), const Vec3& at = Vec3::Zero())
+  explicit Cube(const SmallDeck& deck = empty_space(), const Settings& settings = living_settings(), const Vec3& at = Vec3::Zero())
       : world(deck), parts(world, settings, 2 * r) {
     for (int k = 0; k < n * n * n; ++k) world.add(k + 1, at + apart * Vec3(k % n, k / n % n, k / n / n), r);
     world.reneighbour();
@@ -65,7 +65,7 @@ TEST(Cover, a_wall_closes_the_surface_unless_the_user_says_that_it_is_one) {
       SmallDeck deck = empty_space();
       deck.planes = {SmallDeck::ground(0)};
       deck.planes[0].moving = moving;
-      Settings settings;
+      Settings settings = living_settings();
       settings.walls = closed ? WallCover::closed : WallCover::surface;
       Cube cube(deck, settings, Vec3(0, 0, r));
       cube.parts.cover.close_behind_walls(cube.world.walls.contacts(), [](int) { return true; });
@@ -81,7 +81,7 @@ TEST(Cover, a_moving_wall_closes_only_where_granules_rest_at_it_and_only_while_i
   SmallDeck deck = empty_space();
   deck.planes = {SmallDeck::ground(0)};
   deck.planes[0].moving = true;
-  Cube cube(deck, Settings(), Vec3(0, 0, r));
+  Cube cube(deck, living_settings(), Vec3(0, 0, r));
   Cover& cover = cube.parts.cover;
   cover.close_behind_walls(cube.world.walls.contacts(), [](int) { return false; });
   cover.draw();
@@ -97,7 +97,7 @@ TEST(Cover, a_moving_wall_closes_only_where_granules_rest_at_it_and_only_while_i
 TEST(Cover, a_still_wall_closes_until_the_deck_takes_it_away) {
   SmallDeck deck = empty_space();
   deck.planes = {SmallDeck::ground(0)};
-  Cube cube(deck, Settings(), Vec3(0, 0, r));
+  Cube cube(deck, living_settings(), Vec3(0, 0, r));
   Cover& cover = cube.parts.cover;
   cover.close_behind_walls(cube.world.walls.contacts(), [](int) { return false; });
   cover.draw();
@@ -120,7 +120,7 @@ TEST(Cover, a_thin_plate_closes_the_surface_on_either_side) {
       deck.planes = {{"upper", Vec3::Zero(), normal, moving}, {"lower", Vec3::Zero(), -normal, moving}};
       // a layer on either side, and only what touches the plate on its own side is told of it
       SmallWorld world(deck);
-      WorldParts parts(world, Settings(), 2 * r);
+      WorldParts parts(world, living_settings(), 2 * r);
       const int n = 9;
       for (int side : {0, 1})
         for (int k = 0; k < n * n; ++k) {
@@ -218,7 +218,7 @@ TEST(Cover, depth_does_not_see_borders_between_ranks) {
     deck.split = {ranks, 1, 1};
     std::mutex mutex;
     run_on_ranks(deck, [&](SmallWorld& w) {
-      WorldParts parts(w, Settings(), 2 * r);
+      WorldParts parts(w, living_settings(), 2 * r);
       for (int k = 0; k < 343; ++k) w.add(k + 1, Vec3(0.07, 0, 0) + apart * Vec3(k % 7, k / 7 % 7, k / 49), r);
       w.reneighbour();
       parts.cover.draw();

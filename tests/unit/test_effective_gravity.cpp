@@ -49,12 +49,12 @@ struct Block {
 };
 
 TEST(EffectiveGravity, a_body_that_stands_wakes_when_gravity_tilts_beyond_its_share) {
-  // of |g| across: 3/120 for 343 granules (1.4 degrees), ten times as much for 27 (14.5 degrees)
+  // of |g| across: a tenth of 3/120 for 343 granules (0.14 degrees), ten times as much for 27 (1.4 degrees)
   struct Case {
     int n;
     double sleeps, wakes;
   };
-  for (const Case& c : {Case{7, 1.3, 1.6}, Case{3, 13, 16}})
+  for (const Case& c : {Case{7, 0.13, 0.16}, Case{3, 1.3, 1.6}})
     for (const double degrees : {c.sleeps, c.wakes}) {
       Block block(c.n);
       block.parts.solid.ground(block.number, true);
@@ -70,14 +70,34 @@ TEST(EffectiveGravity, slow_turning_adds_up) {
   Block block(7);
   block.parts.solid.ground(block.number, true);
   block.watch();
-  for (double degrees = 0.2; degrees < 1.3; degrees += 0.2) {
+  for (double degrees = 0.02; degrees < 0.13; degrees += 0.02) {
     block.tilt(degrees);
     block.watch();
     EXPECT_FALSE(block.asks()) << degrees;
   }
-  block.tilt(1.6);
+  block.tilt(0.16);
   block.watch();
   EXPECT_TRUE(block.asks());
+}
+
+TEST(EffectiveGravity, gravity_turns_from_look_to_look_but_not_where_its_size_changes) {
+  Block block(3);
+  block.watch();
+  EXPECT_FALSE(block.parts.gravity.turns());
+  block.tilt(0.001);
+  block.watch();
+  EXPECT_TRUE(block.parts.gravity.turns());
+  block.watch();
+  EXPECT_FALSE(block.parts.gravity.turns()) << "it stands again";
+  block.world.deck.gravity *= 0.5;
+  block.watch();
+  EXPECT_FALSE(block.parts.gravity.turns());
+  block.world.deck.gravity.setZero();
+  block.watch();
+  EXPECT_FALSE(block.parts.gravity.turns());
+  block.tilt(5);
+  block.watch();
+  EXPECT_FALSE(block.parts.gravity.turns()) << "it had no direction";
 }
 
 TEST(EffectiveGravity, a_body_that_rested_wakes_when_it_is_let_fall_and_one_that_falls_on_does_not) {
@@ -142,10 +162,10 @@ TEST(EffectiveGravity, fixed_bodies_feel_gravity_alone) {
   settings.motion = Motion::fixed;
   Block block(7, SmallDeck(), settings);
   block.watch();
-  block.tilt(1.3);
+  block.tilt(0.13);
   block.watch();
   EXPECT_FALSE(block.asks());
-  block.tilt(1.6);
+  block.tilt(0.16);
   block.watch();
   EXPECT_TRUE(block.asks());
 }

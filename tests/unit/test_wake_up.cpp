@@ -96,6 +96,13 @@ TEST(GravityChanged, by_direction) {
   }
 }
 
+TEST(GravityChanged, where_the_deck_turns_gravity_a_tenth_is_enough) {
+  EXPECT_FALSE(three_weights.gravity_changed(tilted(0.140), down, granules, true));  // sin(a) = 0.0025 at 0.143 degrees
+  EXPECT_TRUE(three_weights.gravity_changed(tilted(0.146), down, granules, true));
+  EXPECT_FALSE(three_weights.gravity_changed(1.249 * down, down, granules, true));
+  EXPECT_TRUE(three_weights.gravity_changed(1.251 * down, down, granules, true));
+}
+
 TEST(GravityChanged, by_size_and_direction_each_on_its_own) {
   EXPECT_FALSE(gravity_changed(1.249 * down + Vec3(0.0249 * g, 0, 0), down));
   EXPECT_TRUE(gravity_changed(1.249 * down + Vec3(0.0251 * g, 0, 0), down));

@@ -10,6 +10,13 @@
 
 namespace solidcull {
 
+/// Settings of `exterior live`, with its cover of two diameters.
+inline Settings living_settings() {
+  Settings s;
+  s.exterior = Exterior::live;
+  s.depth = 2.0;
+  return s;
+}
 /// Settings of `exterior sleep` with no cover, as most tests of decisions want them: the surface costs more than the rest.
 inline Settings sleeping_settings() {
   Settings s;
