@@ -33,14 +33,13 @@ void Culling::look() {
   p_.pacing.schedule(step, p_.census.something_locked(), p_.census.something_stored());
 }
 
-/// Before the first step of a run in which nothing is culled.
+/// Before the first step of a run in which nothing is culled. What the deck has tilted since the last one begins to move now.
 void Culling::look_at_once() {
   const auto timed = p_.report.time(Part::look);
-  const std::int64_t step = p_.ports.run.step;
   check_numbers(p_.ports.atoms);
-  proposal_ = survey(true, false);
+  if (!p_.gravity.turns()) proposal_ = survey(true, false);
   p_.pacing.has_looked_at_once();
-  if (p_.ports.ranks.any(!proposal_.chosen.empty())) ask_for_build(step);
+  if (p_.ports.ranks.any(!proposal_.chosen.empty())) ask_for_build(p_.ports.run.step);
 }
 
 /// What is to be culled; what is exposed, or stands at walls that hold it, is seen on the way.

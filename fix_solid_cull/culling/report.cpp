@@ -32,16 +32,16 @@ void Report::count_totals() {
   const Ledger& ledger = solid_.ledger();
   const bool open = solid_.has_store();
   double sums[11] = {ports_.atoms.owned - interface_granules,
-                    interface_granules,
-                    open ? static_cast<double>(solid_.store().size()) : 0.0,
-                    bodies,
-                    open ? solid_.store().mass() : 0.0,
-                    static_cast<double>(ledger.granules_locked()),
-                    static_cast<double>(ledger.granules_restored()),
-                    open ? ledger.mass_error(solid_.store()) : 0.0,
-                    ledger.energy_added(),
-                    static_cast<double>(ledger.granules_locked_again()),
-                    static_cast<double>(ledger.granules_that_moved())};
+                     interface_granules,
+                     open ? static_cast<double>(solid_.store().size()) : 0.0,
+                     bodies,
+                     open ? solid_.store().mass() : 0.0,
+                     static_cast<double>(ledger.granules_locked()),
+                     static_cast<double>(ledger.granules_restored()),
+                     open ? ledger.mass_error(solid_.store()) : 0.0,
+                     ledger.energy_added(),
+                     static_cast<double>(ledger.granules_locked_again()),
+                     static_cast<double>(ledger.granules_that_moved())};
   ports_.ranks.sum(sums, 11);
   double largest[2] = {motion_.largest_excess(), watch_.total()};
   ports_.ranks.largest(largest, 2);

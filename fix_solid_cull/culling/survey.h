@@ -31,11 +31,20 @@ struct AtRest {
 
   static constexpr int packed_size = 14;
   void pack(double* to) const {
-    const double values[packed_size] = {double(calm),           double(waited),         double(since),
-                                        velocity[0],            velocity[1],            velocity[2],
-                                        acceleration_around[0], acceleration_around[1], acceleration_around[2],
-                                        normal_load,            double(woken),          woke_at[0],
-                                        woke_at[1],             woke_at[2]};
+    const double values[packed_size] = {double(calm),
+                                        double(waited),
+                                        double(since),
+                                        velocity[0],
+                                        velocity[1],
+                                        velocity[2],
+                                        acceleration_around[0],
+                                        acceleration_around[1],
+                                        acceleration_around[2],
+                                        normal_load,
+                                        double(woken),
+                                        woke_at[0],
+                                        woke_at[1],
+                                        woke_at[2]};
     std::copy_n(values, packed_size, to);
   }
   static AtRest unpack(const double* v) {

@@ -17,7 +17,7 @@ struct WakeUpLaw {
   static constexpr double growth = 0.5;  ///< c of the carve law
   static constexpr double direction_share = 1.0 / 120,
                           size_share = 1.0 / 12;  ///< for A = 1: 2.5 % and 25 % at the default tolerance
-  static constexpr double turning_share = 0.1;  ///< of the direction's share, where the deck turns gravity
+  static constexpr double turning_share = 0.1;    ///< of the direction's share, where the deck turns gravity
   static constexpr double small_body = 300;       ///< granules: below, the shares grow, tenfold at most
 
   static constexpr double own_share = 0.5, least_share = 0.15;

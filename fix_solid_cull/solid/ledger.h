@@ -52,8 +52,8 @@ class Ledger {
   static constexpr int counters_size = 6, carves_counter = 2;
   using Counters = std::array<double, counters_size>;
   Counters counters() const {
-    return {static_cast<double>(locked_), static_cast<double>(restored_),     static_cast<double>(carves_),
-            energy_.value(),              static_cast<double>(locked_again_), static_cast<double>(moved_)};
+    return {static_cast<double>(locked_),       static_cast<double>(restored_), static_cast<double>(carves_), energy_.value(),
+            static_cast<double>(locked_again_), static_cast<double>(moved_)};
   }
   void set_counters(const Counters& c) {
     locked_ = static_cast<std::int64_t>(c[0]);

@@ -17,7 +17,8 @@ constexpr double apart = 0.999 * 2 * r;
 struct Cube {
   static constexpr int n = 7;
 
-  explicit Cube(const SmallDeck& deck = empty_space(), const Settings& settings = living_settings(), const Vec3& at = Vec3::Zero())
+  explicit Cube(const SmallDeck& deck = empty_space(), const Settings& settings = living_settings(),
+                const Vec3& at = Vec3::Zero())
       : world(deck), parts(world, settings, 2 * r) {
     for (int k = 0; k < n * n * n; ++k) world.add(k + 1, at + apart * Vec3(k % n, k / n % n, k / n / n), r);
     world.reneighbour();

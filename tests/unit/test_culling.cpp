@@ -70,7 +70,7 @@ struct Column {
   double top;
 };
 
-/// One granule of it moves, faster than what rests may and slower than what is calm may.
+/// Its granules move, faster than what rests may and slower than what is calm may.
 TEST(Culling, a_column_that_hardly_moves_is_culled_after_some_looks) {
   SmallWorld world(Column::deck());
   Column column(world);
@@ -129,6 +129,20 @@ TEST(Culling, restore_all_returns_everything) {
   EXPECT_EQ(column.value(exterior), 0);
   EXPECT_EQ(column.value(culled_again), 12);
   EXPECT_EQ(column.value(had_moved), 0);
+}
+
+TEST(Culling, what_the_deck_tilts_between_runs_is_not_culled_before_the_first_step) {
+  for (const double degrees : {0.0, 0.5}) {
+    SmallWorld world(Column::deck());
+    Column column(world);
+    column.run(3);
+    column.culling.end_run();
+    column.culling.restore_all();
+    const double a = degrees * std::acos(-1.0) / 180;
+    world.deck.gravity = 9.81 * Vec3(std::sin(a), 0, -std::cos(a));
+    column.run(1);
+    EXPECT_EQ(column.value(exterior), degrees > 0 ? 12 : 0) << degrees;
+  }
 }
 
 TEST(Culling, a_blow_wakes_what_it_strikes) {
