@@ -168,7 +168,7 @@ std::int64_t Survey::find_calm(const Patience& patience, Proposal& proposal) {
     if (shell_[i].locked) continue;
     const bool solid = is_solid(i, seen, law);
     rows_[i].calm = solid ? rows_[i].calm + 1 : 0;
-    candidates += rows_[i].calm >= patience.looks;
+    candidates += rows_[i].calm >= looks_for(i, patience);
   }
   join_bodies(seen, patience.looks, proposal);
   return candidates;
@@ -234,13 +234,13 @@ std::vector<char> Survey::find_steady(const std::vector<char>& asked) {
 }
 
 void Survey::leave_out_unsteady(const Patience& patience, Proposal& proposal) {
-  const int from = std::max(1, patience.looks - 1);
   const bool live = scales_.needs_surface();
   const Atoms& atoms = ports_.atoms;
   FlatMap<char> chosen = set_of(proposal.chosen);
   std::vector<char> asked(static_cast<std::size_t>(atoms.owned), 0);
   for (int i = 0; i < atoms.owned; ++i) {
     const int calm = shell_[i].locked ? 0 : rows_[i].calm;
+    const int from = std::max(1, looks_for(i, patience) - 1);
     asked[i] = live ? calm == from || chosen.contains(atoms.tag[i]) : calm >= from;
   }
   const std::vector<char> steady = find_steady(asked);
@@ -249,7 +249,7 @@ void Survey::leave_out_unsteady(const Patience& patience, Proposal& proposal) {
     if (live)
       chosen.erase(atoms.tag[i]);
     else
-      rows_[i].calm = std::min(rows_[i].calm, patience.looks - 1);
+      rows_[i].calm = std::min(rows_[i].calm, looks_for(i, patience) - 1);
   }
   keep_only(chosen, proposal.chosen);
 }
@@ -263,7 +263,7 @@ void Survey::choose(int i, Proposal& proposal) {
 
 void Survey::choose_deep(const Patience& patience, Cover& cover, Proposal& proposal) {
   for (int i = 0; i < ports_.atoms.owned; ++i) {
-    if (shell_[i].locked || rows_[i].calm < patience.looks) continue;
+    if (shell_[i].locked || rows_[i].calm < looks_for(i, patience)) continue;
     if (cover.is_deep(i))
       choose(i, proposal);
     else
@@ -271,11 +271,18 @@ void Survey::choose_deep(const Patience& patience, Cover& cover, Proposal& propo
   }
 }
 
+/// A granule that woke and still stands where it stood has shown before that it bears its load there: half of the looks.
+int Survey::looks_for(int i, const Patience& patience) const {
+  if (patience.quick || !rows_[i].woken) return patience.looks;
+  const Vec3 way = solid_.nearest_image(ports_.atoms.place(i), rows_[i].woke_at) - rows_[i].woke_at;
+  return way.norm() > stands_share * scales_.diameter() ? patience.looks : (patience.looks + 1) / 2;
+}
+
 /// Calm for as many looks as what presses on it asks for.
 bool Survey::calm_enough(int i, const Patience& patience) const {
   const double factor =
       patience.quick ? 1 : SolidStateLaw::patience(ports_.atoms.mass[i] * scales_.gravity(), rows_[i].normal_load);
-  return rows_[i].calm >= factor * patience.looks;
+  return rows_[i].calm >= factor * looks_for(i, patience);
 }
 
 void Survey::choose_asleep(const Patience& patience, Proposal& proposal) {

@@ -106,7 +106,8 @@ class Survey {
   std::int64_t exterior_here() const;
 
  private:
-  static constexpr double moved_share = 0.01;  // of d
+  static constexpr double moved_share = 0.01;    // of d
+  static constexpr double stands_share = 0.003;  // likewise
 
   struct Pair {
     int i, j;
@@ -121,6 +122,7 @@ class Survey {
   bool is_solid(int i, const Seen& seen, const SolidStateLaw& law);
   void join_bodies(const Seen& seen, int looks, Proposal& proposal);
   std::vector<char> find_steady(const std::vector<char>& asked);
+  int looks_for(int i, const Patience& patience) const;
   bool calm_enough(int i, const Patience& patience) const;
   void choose(int i, Proposal& proposal);
 

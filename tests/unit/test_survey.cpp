@@ -237,6 +237,26 @@ TEST(Survey, who_is_hardly_pressed_must_be_calm_for_longer) {
   EXPECT_EQ(first, (std::map<std::int64_t, int>{{1, 4}, {2, 4}, {3, 6}, {4, 6}, {5, 8}, {6, 8}}));
 }
 
+TEST(Survey, who_woke_and_stands_where_it_stood_must_be_calm_for_half_as_long) {
+  Bed bed;
+  bed.row(1, 2, Vec3::Zero());           // has never been culled
+  bed.row(3, 2, Vec3(0, 0.05, 0));       // woke and stands
+  bed.row(5, 2, Vec3(0, 0.1, 0));        // woke and has moved since, by 0.4 % of d
+  bed.row(7, 2, Vec3(0, 0.15, 0), 0.1);  // woke, stands, and is hardly pressed: twice the half
+  bed.begin();
+  for (int tag = 3; tag <= 8; ++tag) bed.parts.survey.wakes(bed.world.at(tag));
+  for (const int tag : {5, 6}) {
+    const int i = bed.world.at(tag);
+    bed.world.atoms.set_place(i, bed.world.atoms.place(i) + Vec3(0, 0, 0.004 * 2 * r));
+  }
+  std::map<std::int64_t, int> first;
+  for (int n = 1; n <= 6; ++n) {
+    bed.look();
+    for (const std::int64_t tag : bed.chosen()) first.emplace(tag, n);
+  }
+  EXPECT_EQ(first, (std::map<std::int64_t, int>{{1, 4}, {2, 4}, {3, 2}, {4, 2}, {5, 4}, {6, 4}, {7, 4}, {8, 4}}));
+}
+
 TEST(Survey, quick_looks_do_not_ask_what_presses) {
   Bed bed;
   bed.row(1, 2, Vec3::Zero(), 0.1);
