@@ -251,6 +251,22 @@ void Solid::entered_store(std::int64_t tag) {
   contacts_.drop(tag, [&](std::int64_t partner) { return store_->contains(partner); });
 }
 
+/// Granules that are there already did not know of this one when they went in: what it would be confused with goes.
+void Solid::enter_store(std::int64_t tag) {
+  if (scales_.compact()) {
+    std::vector<std::uint64_t> tail;
+    contacts_.for_each_partner(tag, [&](std::int64_t partner) {
+      if (!store_->contains(partner)) return;
+      store_->tail(partner, tail);
+      const auto at = tail.begin() + static_cast<std::ptrdiff_t>(packed_.find(tail, tag));
+      if (at == tail.end()) return;
+      tail.erase(at, at + static_cast<std::ptrdiff_t>(packed_.words()));
+      store_->set_tail(partner, tail);
+    });
+  }
+  entered_store(tag);
+}
+
 /// What touched and has sites farther apart still hangs together: that stays in the graph.
 void Solid::drop_what_sites_tell(std::int64_t tag) {
   std::vector<std::int64_t> told;

@@ -150,7 +150,7 @@ class Solid {
   int found(const SolidBody& body) { return bodies_.found(body); }
   void take_in(std::int64_t tag, int body) { bodies_.take_in(tag, body); }
   void add_stored(const StoredGranule& g, const double* record, int length);
-  void enter_store(std::int64_t tag) { entered_store(tag); }
+  void enter_store(std::int64_t tag);
   void stands_otherwise() { ++standing_version_; }
 
   // --- walls
