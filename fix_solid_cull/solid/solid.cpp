@@ -164,6 +164,12 @@ void Solid::ground(int body, bool on) {
   find_grid(body);
 }
 
+int Solid::found(const SolidBody& body) {
+  const int number = bodies_.found(body);
+  if (body.grounded) find_grid(number);
+  return number;
+}
+
 void Solid::reframe_one(int body, const GranuleMass& in_world) {
   bodies_.body(body).reframe_one({in_world.mass, in_world.position, bodies_.turning_radius(in_world.radius), in_world.held});
   tell([&](BodyFollower& f) { f.frame_changed(body); });
@@ -256,7 +262,7 @@ void Solid::enter_store(std::int64_t tag) {
   if (scales_.compact()) {
     std::vector<std::uint64_t> tail;
     contacts_.for_each_partner(tag, [&](std::int64_t partner) {
-      if (!store_->contains(partner)) return;
+      if (!store_->contains(partner) || !contacts_.contains(tag, partner)) return;  // or it is packed there already
       store_->tail(partner, tail);
       const auto at = tail.begin() + static_cast<std::ptrdiff_t>(packed_.find(tail, tag));
       if (at == tail.end()) return;
