@@ -54,7 +54,7 @@ class LayCulled(unittest.TestCase):
         cls.place = Path(cls.folder.name)
         cls.before = {name: getattr(scale, name) for name in (*scale.FEW, "few_steps")}
         vars(scale).update(scale.FEW, OUT=cls.place, few_steps=True)
-        cls.small = scale.asleep_bed("few-base")
+        cls.small = scale.asleep_bed("few-rested")
         cls.size = scale.GRANULES
 
     @classmethod
@@ -146,7 +146,7 @@ class LayCulled(unittest.TestCase):
         for ranks in (1, 2, 3):
             with self.subTest(ranks=ranks):
                 deck = ROOT / "validation" / "scale" / ".ranks.in"
-                deck.write_text(HEAD + CULL + "run 20\nvariable n equal atoms+f_cull[3]\nprint \"there are $n granules\"\n")
+                deck.write_text(HEAD + CULL + "run 20\nvariable n equal atoms\nprint \"there are $n granules\"\n")
                 try:
                     words = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-np", str(ranks)] if ranks > 1 else []
                     for name, value in {"restart": file, "floormesh": self.floor(WIDE), **self.sides(WIDE)}.items():
@@ -159,12 +159,22 @@ class LayCulled(unittest.TestCase):
 
     def test_what_cannot_be_laid_is_refused(self):
         floor = lay_culled.Floor(self.small["floor"])
-        with self.assertRaisesRegex(culled_files.CulledFileError, "three at least each way"):
+        with self.assertRaisesRegex(culled_files.CulledFileError, "contacts reach over more than one tile"):
             lay_culled.Source(self.small["restart"], (1, 9), scale.PERIOD, scale.MARGIN, floor)
         with self.assertRaisesRegex(culled_files.CulledFileError, "no bed of 4 x 4 equal tiles"):
             lay_culled.Source(self.small["restart"], (4, 4), scale.PERIOD, scale.MARGIN, floor)
         with self.assertRaisesRegex(culled_files.CulledFileError, "holds no culled granules"):
-            lay_culled.Source(scale.bed("few-base")["restart"], (3, 3), scale.PERIOD, scale.MARGIN, floor)
+            lay_culled.Source(scale.bed("few-rested")["restart"], (3, 3), scale.PERIOD, scale.MARGIN, floor)
+        two = lay_culled.Source(self.small["restart"], (3, 3), scale.PERIOD, scale.MARGIN, floor)
+        two.copies = (2, 3)
+        self.assertEqual(two.like(1, 2, (2, 3)), 5)
+        with self.assertRaisesRegex(culled_files.CulledFileError, "of 2 tiles in a row 5 cannot be laid"):
+            two.like(1, 2, (5, 3))
+        two = lay_culled.Source(self.small["restart"], (3, 3), scale.PERIOD, scale.MARGIN, floor)
+        two.copies = (2, 3)
+        self.assertEqual(two.like(1, 2, (2, 3)), 5)
+        with self.assertRaisesRegex(culled_files.CulledFileError, "of 2 tiles in a row 5 cannot be laid"):
+            two.like(1, 2, (5, 3))
         broken = bytearray(self.small["restart"].read_bytes())
         broken[len(broken) * 2 // 3] ^= 1
         file = self.place / "broken.restart"

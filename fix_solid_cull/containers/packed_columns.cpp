@@ -99,7 +99,8 @@ class Packer {
     different_.clear();
     which_.resize(n);
     for (std::size_t r = 0; r < n; ++r) {
-      const std::size_t k = static_cast<std::size_t>(std::find(different_.begin(), different_.end(), column_[r]) - different_.begin());
+      const std::size_t k =
+          static_cast<std::size_t>(std::find(different_.begin(), different_.end(), column_[r]) - different_.begin());
       if (k == different_.size()) {
         if (k == most_different) return false;
         different_.push_back(column_[r]);

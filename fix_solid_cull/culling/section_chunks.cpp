@@ -52,8 +52,7 @@ void put(std::uint64_t* to, const Pose& p) {
   for (int k = 0; k < 4; ++k) to[3 + k] = bits(p.quaternion().coeffs()[k]);
 }
 Pose pose_of(const std::uint64_t* from) {
-  return Pose(vector_of(from),
-              Eigen::Quaterniond(number(from[6]), number(from[3]), number(from[4]), number(from[5])));
+  return Pose(vector_of(from), Eigen::Quaterniond(number(from[6]), number(from[3]), number(from[4]), number(from[5])));
 }
 
 /// Mixes a word into a sum that does not depend on the order in which granules come.

@@ -152,7 +152,8 @@ void Snapshot::read(const std::vector<double>& state, const std::string& file) {
   solid_.set_counters(counted);
 
   // the neighbour cut-off is set before the store is taken up: it must know the largest stored radius
-  const int known = static_cast<int>(std::min<std::size_t>(solid_.largest_radius_by_type().size(), static_cast<std::size_t>(h[types])));
+  const int known =
+      static_cast<int>(std::min<std::size_t>(solid_.largest_radius_by_type().size(), static_cast<std::size_t>(h[types])));
   for (int type = 1; type < known; ++type) solid_.know_radius(type, h[header_size + type]);
 }
 
@@ -239,8 +240,8 @@ void Snapshot::take(std::uint64_t identity, bool as_it_was) {
   std::int64_t stored = static_cast<std::int64_t>(solid_.store().size());
   ports_.ranks.sum(&stored, 1);
   if (stored != static_cast<std::int64_t>(due.interior))
-    throw InternalError("of " + std::to_string(due.interior) + " interior granules of the restart file " + std::to_string(stored) +
-                        " were taken up");
+    throw InternalError("of " + std::to_string(due.interior) + " interior granules of the restart file " +
+                        std::to_string(stored) + " were taken up");
 }
 
 }  // namespace solidcull

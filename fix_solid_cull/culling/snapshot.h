@@ -58,9 +58,9 @@ class Snapshot {
   Parcels& parcels_;
   EffectiveGravity& gravity_;
   const Cover& cover_;
-  std::vector<double> state_;  // of the file's head
-  std::string file_;           // that was read
-  std::uint64_t identity_ = 0; // of the file that is being written
+  std::vector<double> state_;   // of the file's head
+  std::string file_;            // that was read
+  std::uint64_t identity_ = 0;  // of the file that is being written
 };
 
 }  // namespace solidcull

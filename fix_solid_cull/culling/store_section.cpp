@@ -67,8 +67,8 @@ void SectionWriter::put(const SectionChunk& chunk) {
 
 void SectionWriter::close(const SectionCounts& counts) {
   if (ranks_.me == 0) {
-    std::uint64_t end[end_words] = {ends,           identity_, bytes_ + end_words * word, chunks_, counts.interior, counts.interface_granules,
-                                    counts.contacts, 0};
+    std::uint64_t end[end_words] = {
+        ends, identity_, bytes_ + end_words * word, chunks_, counts.interior, counts.interface_granules, counts.contacts, 0};
     end[end_words - 1] = section_sum(reinterpret_cast<const char*>(end), (end_words - 1) * word);
     write(end, sizeof end);
     if (file_ && std::fclose(file_) != 0 && error_ == 0) error_ = errno;
@@ -96,7 +96,9 @@ SectionReader::SectionReader(const Ranks& ranks, const std::string& file, std::u
   const auto open = [&] {
     if (file.empty()) return std::string("the file that read_restart read is not known: read it with the command read_restart");
     file_ = std::fopen(file.c_str(), "rb");
-    if (!file_) return "the restart file " + file + " cannot be opened again (" + std::strerror(errno) + "): it holds the granules of this fix";
+    if (!file_)
+      return "the restart file " + file + " cannot be opened again (" + std::strerror(errno) +
+             "): it holds the granules of this fix";
     const std::string cut = "the restart file " + file +
                             " ends before the granules of this fix do: it was cut when it was written or copied; use a whole one";
     std::uint64_t end[end_words];
@@ -107,8 +109,8 @@ SectionReader::SectionReader(const Ranks& ranks, const std::string& file, std::u
         end[2] > static_cast<std::uint64_t>(size) || end[2] < (beginning_words + end_words) * word)
       return "the restart file " + file + " is damaged at its end: use another one";
     std::uint64_t beginning[beginning_words];
-    if (fseeko(file_, size - static_cast<off_t>(end[2]), SEEK_SET) != 0 || std::fread(beginning, sizeof beginning, 1, file_) != 1 ||
-        beginning[0] != begins || beginning[1] != end[1])
+    if (fseeko(file_, size - static_cast<off_t>(end[2]), SEEK_SET) != 0 ||
+        std::fread(beginning, sizeof beginning, 1, file_) != 1 || beginning[0] != begins || beginning[1] != end[1])
       return "the restart file " + file + " is damaged where the granules of this fix begin: use another one";
     if (end[1] != identity)
       return "the restart file " + file + " holds the granules of another restart file: use a file as it was written";
@@ -157,7 +159,8 @@ void SectionReader::body(SectionChunk& chunk, bool wanted) {
     } else {
       chunk.bytes.resize(size_);
       const bool read = std::fread(chunk.bytes.data(), 1, size_, file_) == size_;
-      const std::uint64_t sum = section_sum(chunk.bytes.data(), size_) + section_sum(reinterpret_cast<const char*>(head_), sizeof head_);
+      const std::uint64_t sum =
+          section_sum(chunk.bytes.data(), size_) + section_sum(reinterpret_cast<const char*>(head_), sizeof head_);
       if (!read || sum != sum_)
         wrong = "the restart file " + name_ + " is damaged among the granules of this fix: use another one";
     }

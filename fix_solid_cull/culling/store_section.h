@@ -18,8 +18,8 @@
 //   contacts: the lower tag, the higher one, body in whose frame the history is, whether it has a history, the history as the
 //     lower tag sees it;
 //   how many further tables follow (one word), each of interior granules whose engine records are equally long: tag, body, place
-//     (3), radius, mass, type, number of the layout, step of locking, normal load (N), load change (3, N, frame of the body), walls,
-//     held, the record. Tag, body, type, layout, step, walls and held are whole numbers.
+//     (3), radius, mass, type, number of the layout, step of locking, normal load (N), load change (3, N, frame of the body),
+//     walls, held, the record. Tag, body, type, layout, step, walls and held are whole numbers.
 // A contact stands with the one of its granules that comes later in this rank's chunks, or with the one that is on this rank; a
 // contact across ranks stands with either rank.
 #pragma once

@@ -7,7 +7,17 @@
 
 namespace solidcull::engine {
 
-enum class Call { add_fix, begin_run, count_fixes, deck_command, formula, add_region, mesh_contact, neighbor_build, write_restart };
+enum class Call {
+  add_fix,
+  begin_run,
+  count_fixes,
+  deck_command,
+  formula,
+  add_region,
+  mesh_contact,
+  neighbor_build,
+  write_restart
+};
 
 struct Interposed {
   Call call;

@@ -76,8 +76,8 @@ void RestartFile::finish() {
   if (me == 0) takes_its_name("base");
   MPI_Allreduce(&failed, &anywhere, 1, MPI_INT, MPI_MAX, lmp_->world);
   if (!anywhere) return;
-  const std::string line = "the restart file " + name_ + " could not take its name (" + std::strerror(anywhere) + "): it is there as " +
-                           part_ + "; rename it";
+  const std::string line = "the restart file " + name_ + " could not take its name (" + std::strerror(anywhere) +
+                           "): it is there as " + part_ + "; rename it";
   lmp_->error->all(FLERR, line.c_str());
 }
 

@@ -3,10 +3,10 @@
 
     validation/scale/lay_culled.py SOURCE NX NY FILE MX MY --floors FLOOR NEW-FLOOR [--period P] [--margin M] [--top Z] [--shift DX]
 
-SOURCE: restart file that doze.in wrote on one rank, of a bed that tiles.py laid of NX x NY tiles, three at least each way. FILE:
-the bed of MX x MY tiles. Its sides, edges and corners are those of SOURCE, its middle is the middle of SOURCE, as often as it
+SOURCE: restart file that doze.in wrote on one rank, of a bed that tiles.py laid of NX x NY tiles, three at least each way, or as
+many as FILE has. FILE: the bed of MX x MY tiles. Its sides, edges and corners are those of SOURCE, its middle is the middle of SOURCE, as often as it
 takes; the tiles around the middle of SOURCE are those around the middle of FILE. FLOOR, NEW-FLOOR: the floors' STL files, grids
-as scale.py writes them. The ball goes to the middle, DX beside it.
+as scale.py writes them. The ball goes over the middle, DX beside it, as far above the first granule that it will touch.
 
 It works tile by tile: what is in memory is SOURCE and one tile. Contacts, histories and what each granule was locked with go
 along; the bodies' mass properties are summed anew, and LIGGGHTS settles their motion. Where tiles meet that did not meet in
@@ -39,7 +39,7 @@ FROM_END = 19
 CHANGED, SPANNED, SUMMED, FELT, FELT_KNOWN, STEP_THEN, GROUNDED, GROUNDED_MASS = 0, 1, 5, 6, 9, 13, 17, 18
 MAIN = 0                                            # the body that holds nearly all, in what is written
 FORWARD = ((0, 1), (1, -1), (1, 0), (1, 1))         # from a tile to those that come after it
-PART_COLUMNS = 20
+BALL_RADIUS = 11                                    # word of an atom's record
 
 
 class Floor:
@@ -94,8 +94,6 @@ class Source:
             raise files.CulledFileError(f"{file} was not written on one rank with store exact")
         self.width, self.step = int(state[files.STATE_WIDTH]), int(state[files.STATE_STEP])
         self.copies, self.period, self.margin, self.floor = copies, period, margin, floor
-        if min(copies) < 3:
-            raise files.CulledFileError(f"{file} has {copies[0]} x {copies[1]} tiles: three at least each way have a middle")
         self.read_atoms(section, file)
         n = copies[0] * copies[1]
         # granules of a tile: {columns: list of arrays}, one set of columns for each length of record; lists while reading
@@ -210,6 +208,10 @@ class Source:
     def like(self, i, j, copies):
         """The number of the tile to lay at (i, j)."""
         def source(k, n, of):
+            if n == of:
+                return k
+            if of < 3:
+                raise files.CulledFileError(f"of {of} tiles in a row {n} cannot be laid: three at least have a middle")
             return 0 if k == 0 else of - 1 if k == n - 1 else 1 + (k - 1 + of // 2 - n // 2) % (of - 2)
         return source(i, copies[0], self.copies[0]) * self.copies[1] + source(j, copies[1], self.copies[1])
 
@@ -424,6 +426,11 @@ def write_head(f, source, copies, like, index, corner, floor, total, interface, 
     struct.pack_into("q", head, where[tiles.NATOMS], 1 + interface)
     ball = source.ball.copy()
     then = [c * source.period + 2 * source.margin for c in source.copies]
+    corner_then = {(t // source.copies[1], t % source.copies[1]): np.array([source.margin + t // source.copies[1] * source.period,
+                                                                          source.margin + t % source.copies[1] * source.period, 0.0])
+                   for t in range(source.copies[0] * source.copies[1])}
+    like_then = {place: place[0] * source.copies[1] + place[1] for place in corner_then}
+    ball[tiles.X + 2] += touch(source, like, corner, sides, ball[BALL_RADIUS]) - touch(source, like_then, corner_then, then, ball[BALL_RADIUS])
     ball[tiles.X:tiles.X + 2] += (np.array(sides) - then) / 2
     ball[tiles.X] += shift
     ball.view(np.int64)[tiles.TAG] = total + 1
@@ -435,6 +442,22 @@ def write_head(f, source, copies, like, index, corner, floor, total, interface, 
     f.write(struct.pack("i", sum(map(len, atoms))))
     for record in atoms:
         record.tofile(f)
+
+
+def touch(source, like, corner, sides, radius):
+    """The height at which a ball that falls onto the middle of a bed touches its first granule (m)."""
+    highest, middle = -np.inf, np.array(sides) / 2
+    for place, t in like.items():
+        if (abs(corner[place][:2] + source.period / 2 - middle) > source.period).any():
+            continue
+        for key, table in [*source.interior[t].items(), (None, source.interface[t])]:
+            x = numbers(table[PLACE:PLACE + 3].T) + corner[place]
+            r = numbers(table[I_RADIUS if key is None else RADIUS]) + radius
+            under = ((x[:, :2] - middle)**2).sum(1)
+            below = under < r * r
+            if below.any():
+                highest = max(highest, float((x[below, 2] + np.sqrt(r[below]**2 - under[below])).max()))
+    return highest
 
 
 def moved_atom(source, tag, t, place, index, corner, floor):

@@ -54,10 +54,12 @@ BEDS = {"20k": ((1, 1), None, 12000, 10, 1000), "base": ((3, 3), None, 5000, 4, 
         "rested": ((3, 3), "base", 6000, 6, 500), "160k": ((4, 2), "rested", 2500, 10, 250), "1.28M": ((8, 8), "rested", 1000, 5, 250)}
 # name: tiles in x and y, the bed whose culled restart file it is laid of; it never was atoms, so there are no other runs of it
 LAID = {"10.24M": ((32, 16), "1.28M")}
-DOZE = 1500                    # steps in which a bed is put to sleep
-FEW_BEDS = {"tiny": ((1, 1), None, 500, 2, 50), "few-base": ((3, 3), None, 3500, 4, 200), "small": ((4, 2), "few-base", 500, 2, 100)}
-FEW = {"PERIOD": 0.015, "GRANULES": 700, "BEDS": FEW_BEDS, "LAID": {"laid": ((6, 4), "few-base")}, "DOZE": 6000, "OUT": OUT / "few"}
-FEW_TILE = {"poursteps": 4000, "dampsteps": 8000, "freesteps": 1000}
+DOZE = 8000                    # steps in which a bed is put to sleep
+FEW_BEDS = {"tiny": ((1, 1), None, 500, 2, 50), "few-base": ((3, 3), None, 150, 2, 20), "small": ((4, 2), "few-base", 50, 2, 20),
+            "few-rested": ((3, 3), None, 3500, 4, 200)}
+FEW = {"PERIOD": 0.015, "GRANULES": 700, "BEDS": FEW_BEDS, "LAID": {"laid": ((6, 4), "few-rested")}, "DOZE": 7000, "OUT": OUT / "few"}
+FEW_TILE = {"poursteps": 3000, "dampsteps": 1500, "freesteps": 100}
+FEW_RESTED_TILE = {"poursteps": 4000, "dampsteps": 8000, "freesteps": 1000}  # for a bed that is to sleep as a whole
 HELPERS = ("base", "rested")      # beds that others are laid of, not sizes
 few_steps = False
 
@@ -73,11 +75,13 @@ def sides_of(copies):
     return [round(n * PERIOD + 2 * MARGIN, 9) for n in copies]
 
 
-def tile():
-    """The settled tile, periodic in x and y."""
-    variables = {"P": PERIOD, "granules": GRANULES, **(FEW_TILE if few_steps else {})}
-    return beds.made(OUT / "tile.restart", json.dumps(variables) + text_of("tile.in", "material.in"),
-                lambda part: engine.run_liggghts(HERE / "tile.in", HERE, OUT / "tile.log", {**variables, "restart": part}))
+def tile(of):
+    """The settled tile of a bed, periodic in x and y."""
+    rested = few_steps and of.endswith("rested")
+    variables = {"P": PERIOD, "granules": GRANULES, **(FEW_RESTED_TILE if rested else FEW_TILE if few_steps else {})}
+    name = "tile-rested" if rested else "tile"
+    return beds.made(OUT / f"{name}.restart", json.dumps(variables) + text_of("tile.in", "material.in"),
+                lambda part: engine.run_liggghts(HERE / "tile.in", HERE, OUT / f"{name}.log", {**variables, "restart": part}))
 
 
 def write_floor(file, sides):
@@ -92,7 +96,7 @@ def bed(name):
     """The bed at rest: files restart, floor, granules (.npy), and its recipe's hash."""
     copies, source, damp, stills, free = BEDS[name]
     sides, floor, granules = sides_of(copies), OUT / f"floor-{name}.stl", OUT / f"bed-{name}.npy"
-    source_file = bed(source)["restart"] if source else tile()
+    source_file = bed(source)["restart"] if source else tile(name)
     variables = {"L": sides[0], "W": sides[1], "dampsteps": damp, "stills": stills, "freesteps": free}
     recipe = json.dumps([variables, copies, ELEMENT, TOP]) + text_of("relax.in", "material.in", "bed.in") + (HERE / "tiles.py").read_text() \
         + beds.recipe_of(source_file)
