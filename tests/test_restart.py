@@ -5,6 +5,8 @@ SOLIDCULL_ALL_RANKS=1: each order with each number of ranks that writes and that
 import itertools
 import os
 import re
+import shutil
+import subprocess
 import tempfile
 import unittest
 from pathlib import Path
@@ -182,17 +184,112 @@ class Restart(Case):
         self.accepted(BLOCK + f"{CULL_BLOCK}\nrun 0\nwrite_restart {file}\n")
         self.accepted(resumed(file, "run 10\n"))
 
+    def copy(self, name, data):
+        file = self.place / name
+        file.write_bytes(data)
+        return file
+
+    def section(self, data):
+        """Where what is culled begins in a restart file: its length stands in its end."""
+        end, length = data[-64:], int.from_bytes(data[-48:-40], "little")
+        self.assertEqual((end[:8], data[-length:][:8]), (b"SDCULLE1", b"SDCULLB1"))
+        return len(data) - length
+
+    def refused_file(self, name, data, line, ranks=1):
+        file = self.copy(name, data)
+        self.refused_by_fix(resumed(file, f"{CULL_BLOCK}\nrun 10\n"), line.format(file=file), ranks=ranks)
+
+    DAMAGED = "the restart file {file} is damaged among the granules of this fix: use another one"
+    CUT = "the restart file {file} ends before the granules of this fix do: it was cut when it was written or copied; use a whole one"
+
     def test_damaged_files(self):
         whole = self.file(1).read_bytes()
         at = whole.index(b"solid/cull\0") + len(b"solid/cull\0") + 4  # the state begins after its size
-        for k, place in enumerate([at, at + 6, at + 8 * 20, at + 8 * 1000, at + 8 * 5000]):
-            with self.subTest(byte=place - at):
+        for place in (0, 6, 8 * 20, 8 * 25):
+            with self.subTest(head=place):
                 broken = bytearray(whole)
-                broken[place] ^= 0x55
-                file = self.place / f"broken-{k}.restart"
-                file.write_bytes(broken)
-                self.refused_by_fix(resumed(file, f"{CULL_BLOCK}\nrun 10\n"),
-                                    "the restart file is damaged where it holds this fix's granules: use another one")
+                broken[at + place] ^= 0x55
+                self.refused_file("broken-head.restart", broken,
+                                  "the restart file is damaged where it holds this fix's granules: use another one")
+        section = self.section(whole)
+        length = len(whole) - section
+        for place, ranks in ((20, 1), (length // 3, 2), (length // 2, 1), (length - 80, 3)):
+            with self.subTest(section=place, ranks=ranks):
+                broken = bytearray(whole)
+                broken[section + place] ^= 0x55
+                self.refused_file("broken.restart", broken, self.DAMAGED, ranks)
+
+    def test_files_that_were_cut(self):
+        whole = self.file(1).read_bytes()
+        section = self.section(whole)
+        for size, ranks in ((len(whole) - 1, 1), (len(whole) - 5000, 2), (section + 16, 1), (section, 2)):
+            with self.subTest(left=size - section, ranks=ranks):
+                self.refused_file("cut.restart", whole[:size], self.CUT, ranks)
+
+    def test_the_head_of_one_file_and_the_end_of_another(self):
+        one, other = (self.file(ranks).read_bytes() for ranks in (1, 2))
+        mixed = one[:self.section(one)] + other[self.section(other):]
+        self.refused_file("mixed.restart", mixed,
+                          "the restart file {file} holds the granules of another restart file: use a file as it was written")
+
+    def test_a_file_that_goes_before_the_first_run(self):
+        file = self.copy("gone.restart", self.file(1).read_bytes())
+        self.refused_by_fix(resumed(file, f"{CULL_BLOCK}\nshell rm {file}\nrun 10\n"),
+                            f"the restart file {file} cannot be opened again (No such file or directory): it holds the granules of this fix")
+
+    def test_a_file_that_has_another_name_now(self):
+        self.goes_on(lambda file: resumed(self.copy("renamed", file.read_bytes()), f"{CULL_BLOCK}\nrun {AFTER}\n", END), ((2, 1),))
+
+    def test_numbered_files_and_a_file_for_each_rank(self):
+        for written, read in SOME:
+            for pattern, named in (("many-*.restart", "many-*.restart"), ("each-%.restart", "each-%.restart"),
+                                   ("both-*-%.restart", "both-*-%.restart")):
+                with self.subTest(written_on=written, read_on=read, file=pattern), tempfile.TemporaryDirectory(dir=self.place) as folder:
+                    folder = Path(folder)
+                    out = folder / pattern
+                    self.accepted(BLOCK + f"write_restart {out}\n" + BALL + f"{CULL_BLOCK}\nrun {BEFORE}\nwrite_restart {out}\n", ranks=written)
+                    files = sorted(f.name for f in folder.iterdir())
+                    self.assertFalse([f for f in files if f.endswith(".part")], files)
+                    self.assertEqual(len(files), (1 + written if "%" in pattern else 1) * (2 if "*" in pattern else 1), files)
+                    end, straight = self.end_of(resumed(folder / named, f"{CULL_BLOCK}\nrun {AFTER}\n", END), read), self.straight()
+                    self.assertEqual(sorted(end), sorted(straight))
+                    for tag, row in straight.items():
+                        for x, y in zip(row[2:5], end[tag][2:5]):
+                            self.assertLess(abs(x - y), 1e-6 * DIAMETER, f"granule {tag}")
+
+    def test_files_of_a_run_replace_one_another_whole(self):
+        one, two = self.place / "turn-a.restart", self.place / "turn-b.restart"
+        self.accepted(BLOCK + BALL + f"{CULL_BLOCK}\nrestart 50 {one} {two}\nrun {BEFORE}\n")
+        for file in (one, two):
+            self.section(file.read_bytes())
+        self.assertFalse(list(self.place.glob("*.part")))
+        self.accepted(resumed(one, f"{CULL_BLOCK}\nrun 10\n", END.replace("custom end", f"custom {self.place / 'end'}")))
+
+    def test_a_file_that_cannot_be_written(self):
+        """On a device that is full, nothing is left that looks like a restart file."""
+        if not Path("/dev/full").exists():
+            self.skipTest("no /dev/full")
+        part = self.place / "full.restart.part"
+        part.symlink_to("/dev/full")
+        try:
+            self.refused_by_fix(BLOCK + BALL + f"{CULL_BLOCK}\nrun {BEFORE}\nwrite_restart {self.place / 'full.restart'}\n",
+                                "the restart file could not be written (No space left on device): make room, or write it elsewhere")
+            self.assertFalse((self.place / "full.restart").exists())
+        finally:
+            part.unlink(missing_ok=True)
+
+    def test_what_reads_the_file_without_the_fix_sees_its_atoms(self):
+        """As any LIGGGHTS does: it does not look behind the atoms."""
+        file, text = self.file(1), resumed(self.file(1), "")
+        self.assertGreater(len(file.read_bytes()), self.section(file.read_bytes()))
+        stock = shutil.which("liggghts")
+        if not stock:
+            self.skipTest("no LIGGGHTS without the plug-in")
+        with tempfile.TemporaryDirectory(dir=self.place) as folder:
+            deck = Path(folder) / "in"
+            deck.write_text(text + 'run 0\nvariable n equal atoms\nprint "there are $n"\n')
+            told = subprocess.run([stock, "-in", str(deck)], cwd=folder, capture_output=True, text=True, timeout=300).stdout
+            self.assertIn(f"there are {GRANULES - self.interior[1]}", told)
 
 
 if __name__ == "__main__":

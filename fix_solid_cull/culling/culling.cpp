@@ -98,8 +98,8 @@ void Culling::set_up_atoms() {
   if (p_.snapshot.waits()) {
     p_.snapshot.take_up();
     count_restored();
-    p_.shown.show();  // this deck may hold or drive what the one before did not
-    hide_guests();
+    // this deck may hold or drive what the one before did not
+    p_.exchange.set_stored_groups(p_.claims.wake_claimed());
   }
   const bool other_walls = p_.walls.walls_are_others();
   if (other_walls) granules_may_change();

@@ -58,7 +58,10 @@ class Culling {
   void enclose_stored(Box& box) const;                     ///< the box must not be smaller. Local
   double memory_bytes() const;                             ///< local
   std::vector<double> restart_state();                     ///< on rank 0; the first number is how many
-  void read_restart_state(const char* bytes) { p_.snapshot.read(Snapshot::from_bytes(bytes)); }  ///< local
+  /// What goes with the state of a restart file, at the end of the file.
+  void append_restart(const std::string& file) { p_.snapshot.append_to(file); }
+  /// file: what the state was read from.
+  void read_restart_state(const char* bytes, const std::string& file) { p_.snapshot.read(Snapshot::from_bytes(bytes), file); }
 
   // --- what follows the engine's atoms; local
   const std::vector<FollowsAtoms*>& followers() { return p_.followers; }

@@ -10,6 +10,7 @@
 #include "census.h"
 #include "contact_freezing.h"
 #include "cover.h"
+#include "deck_claims.h"
 #include "effective_gravity.h"
 #include "granule_masses.h"
 #include "grounding.h"
@@ -82,6 +83,7 @@ struct CullingParts {
   Snapshot snapshot;
   BodyMeshes meshes;
   ShownBed shown;
+  DeckClaims claims;
 
   Report report;
   OutputFiles files;

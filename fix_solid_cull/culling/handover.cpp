@@ -52,7 +52,7 @@ bool Handover::send_home() {
   std::sort(atoms.begin(), atoms.end());
   const std::vector<std::int64_t> stored = stored_elsewhere();
   if (!ports_.ranks.any(!atoms.empty() || !stored.empty())) return false;
-  const std::vector<double> numbers = ports_.ranks.gather(parcels_.pack(stored, atoms, false));
+  const std::vector<double> numbers = ports_.ranks.gather(parcels_.pack(stored, atoms));
   leave(atoms, stored);
   parcels_.take_up(parcels_.unpack(numbers.data(), numbers.size(), solid_.contacts().width()));
   return true;

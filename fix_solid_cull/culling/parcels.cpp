@@ -77,8 +77,8 @@ Pose read_pose(Reader& in) {
 
 // ------------------------------------------------------------------------------------------------------------ to numbers
 
-std::vector<double> Parcels::pack(const std::vector<std::int64_t>& stored, const std::vector<std::int64_t>& interface_tags,
-                                  bool all) const {
+std::vector<double> Parcels::pack(const std::vector<std::int64_t>& stored,
+                                  const std::vector<std::int64_t>& interface_tags) const {
   const FrozenContacts& contacts = solid_.contacts();
   const SolidBodies& living = solid_.bodies();
   Writer w;
@@ -132,7 +132,7 @@ std::vector<double> Parcels::pack(const std::vector<std::int64_t>& stored, const
     ++count;
   };
   contacts.for_each_contact([&](std::int64_t low, std::int64_t high, const double* history) {
-    if (all || named.contains(low) || named.contains(high)) edge(low, high, history);
+    if (named.contains(low) || named.contains(high)) edge(low, high, history);
   });
   std::vector<double> inner(contacts.width());
   for (const std::int64_t tag : stored)
@@ -154,26 +154,28 @@ std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::s
   std::vector<Parcel> parcels;
   Reader in(numbers, n);
   while (in.more()) {
-    Parcel p;
-    p.rank = static_cast<int>(in.whole());
-    p.observer = read_pose(in);
-    p.observed_then = read_pose(in);
+    auto sender = std::make_shared<Sender>();
+    sender->rank = static_cast<int>(in.whole());
+    sender->observer = read_pose(in);
+    sender->observed_then = read_pose(in);
     std::vector<int> layout;
     for (std::size_t k = in.count(); k > 0; --k) layout.push_back(ports_.atoms.layout_from_text(in.text()));
-    p.bodies.resize(in.count());
-    for (SolidBody& body : p.bodies) body.each_number([&](auto& x) { x = static_cast<std::decay_t<decltype(x)>>(in.number()); });
+    sender->bodies.resize(in.count());
+    for (SolidBody& body : sender->bodies)
+      body.each_number([&](auto& x) { x = static_cast<std::decay_t<decltype(x)>>(in.number()); });
+    Parcel p;
     for (std::size_t k = in.count(); k > 0; --k) {
       Parcel::Granule g;
-      const std::int64_t tag = in.whole();
+      g.tag = in.whole();
       g.mass = in.number();
       g.radius = in.number();
       g.held = in.whole() != 0;
-      g.body = static_cast<int>(in.below(p.bodies.size()));
+      g.body = static_cast<int>(in.below(sender->bodies.size()));
       g.place = in.vector();
       g.length = static_cast<int>(in.whole());
       if (g.length != Parcel::no_record) {
         StoredGranule& s = g.stored;
-        s.tag = tag;
+        s.tag = g.tag;
         s.mass = g.mass;
         s.radius = g.radius;
         s.position = g.place;
@@ -187,78 +189,77 @@ std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::s
         if (scales_.image_by_place()) s.lock_step = std::min(s.lock_step, StoreExchange::locked_long_ago);
         g.record = in.numbers(static_cast<std::size_t>(g.length));
       }
-      p.granules.emplace(tag, g);
+      p.granules.push_back(g);
     }
     for (std::size_t k = in.count(); k > 0; --k) {
-      Parcel::Edge e{in.whole(), 0, 0, {}};
+      Parcel::Edge e{in.whole(), 0, 0, nullptr};
       e.high = in.whole();
-      e.body = static_cast<int>(in.below(p.bodies.size()));
-      if (in.whole()) {
-        const double* h = in.numbers(width);
-        e.history.assign(h, h + width);
-      }
-      p.edges.push_back(std::move(e));
+      e.body = static_cast<int>(in.below(sender->bodies.size()));
+      if (in.whole()) e.history = in.numbers(width);
+      p.edges.push_back(e);
     }
+    p.sender = sender;
     parcels.push_back(std::move(p));
   }
   return parcels;
 }
 
-bool Parcels::is_whole_rank(const Parcel& p) const {
-  std::size_t locked = 0;
-  for (int i = 0; i < ports_.atoms.owned; ++i) locked += shell_[i].locked;
-  for (const auto& [tag, g] : p.granules) {
-    if (g.record ? !ports_.ranks.owns(p.bodies.at(g.body).pose.to_world(g.place)) : !index_.contains(tag)) return false;
-    locked -= g.record == nullptr;
-  }
-  return locked == 0;
+// ------------------------------------------------------------------------------------------------------------ as it was
+
+void Parcels::begin_as_it_was(const Sender& sender) {
+  solid_.stands_otherwise();
+  cover_.set_observer(sender.observer, sender.observed_then);
+  number_.clear();
+  for (const SolidBody& body : sender.bodies) number_.push_back(solid_.found(body));
 }
 
-void Parcels::take_up_as_it_was(const Parcel& p) {
-  solid_.stands_otherwise();
-  cover_.set_observer(p.observer, p.observed_then);
-  std::vector<int> number;
-  for (const SolidBody& body : p.bodies) number.push_back(solid_.found(body));
-  for (const auto& [tag, g] : p.granules) {
-    const int body = number.at(g.body);
-    solid_.take_in(tag, body);
+void Parcels::take_as_it_was(const Parcel& p) {
+  for (const Parcel::Granule& g : p.granules) {
+    const int body = number_.at(static_cast<std::size_t>(g.body));
     if (g.record) {
       StoredGranule s = g.stored;
       s.body = body;
       solid_.add_stored(solid_.store().rounded(s), g.record, g.length);
     } else {
-      shell_.arrives(index_.at(tag), {body, g.place});
+      solid_.take_in(g.tag, body);
+      shell_.arrives(index_.at(g.tag), {body, g.place});
     }
   }
-  for (const Parcel::Edge& e : p.edges) solid_.freeze_in_frame(e.low, e.high, e.history.empty() ? nullptr : e.history.data());
-  for (const auto& [tag, g] : p.granules)
-    if (g.record) solid_.enter_store(tag);
+  for (const Parcel::Edge& e : p.edges) solid_.freeze_in_frame(e.low, e.high, e.history);
+  for (const Parcel::Granule& g : p.granules)
+    if (g.record) solid_.enter_store(g.tag);
+}
+
+void Parcels::end_as_it_was() {
+  number_ = {};
   // with `motion fixed` bodies are never settled: what a rigid one needs is not in such a file
-  const bool unsettled = std::any_of(p.bodies.begin(), p.bodies.end(), [](const SolidBody& b) { return !(b.motion.mass() > 0); });
+  const auto& bodies = solid_.bodies().bodies();
+  const bool unsettled = std::any_of(bodies.begin(), bodies.end(), [](const auto& b) { return !(b.second.motion.mass() > 0); });
   if (ports_.ranks.any(unsettled))
     groups_.settle();
   else
     groups_.group();
 }
 
-void Parcels::take_contacts(const std::vector<Parcel>& parcels, const std::map<std::int64_t, Taken>& taken) {
+// ------------------------------------------------------------------------------------------------------------ taken up anew
+
+void Parcels::take_contacts(const Parcel& p, const std::map<std::int64_t, Taken>& taken) {
   const auto ours = [&](std::int64_t tag) { return taken.count(tag) || solid_.bodies().body_of(tag); };
-  for (const Parcel& p : parcels)
-    for (const Parcel::Edge& e : p.edges) {
-      if ((!ours(e.low) && !ours(e.high)) || solid_.contacts().contains(e.low, e.high)) continue;
-      if (e.history.empty()) {
-        solid_.freeze_in_frame(e.low, e.high, nullptr);
-        continue;
-      }
-      std::vector<double> history = e.history;
-      solid_.contacts().turn(history.data(), p.bodies.at(e.body).pose.turn());
-      solid_.freeze(e.low, e.high, history.data());
+  for (const Parcel::Edge& e : p.edges) {
+    if ((!ours(e.low) && !ours(e.high)) || solid_.contacts().contains(e.low, e.high)) continue;
+    if (!e.history) {
+      solid_.freeze_in_frame(e.low, e.high, nullptr);
+      continue;
     }
+    std::vector<double> history(e.history, e.history + solid_.contacts().width());
+    solid_.contacts().turn(history.data(), p.sender->bodies.at(e.body).pose.turn());
+    solid_.freeze(e.low, e.high, history.data());
+  }
 }
 
 void Parcels::take_granule(std::int64_t tag, const Taken& t) {
   const Parcel::Granule& g = *t.granule;
-  const SolidBody& from = t.parcel->bodies.at(g.body);
+  const SolidBody& from = t.parcel->sender->bodies.at(g.body);
   const Vec3 x = from.pose.to_world(g.place);
   const SolidBodies::Place at =
       solid_.lock(tag, {g.mass, g.radius, x, from.twist.at(x), from.twist.spin, g.held}, masses_.by_tag());
@@ -278,23 +279,30 @@ void Parcels::take_granule(std::int64_t tag, const Taken& t) {
   }
 }
 
-void Parcels::take_up(const std::vector<Parcel>& parcels) {
-  solid_.stands_otherwise();
+void Parcels::take(const Parcel* parcels, std::size_t n) {
   std::map<std::int64_t, Taken> taken;  // by tag, so that bodies are founded in the same order whoever sent what
-  for (const Parcel& p : parcels)
-    for (const auto& [tag, g] : p.granules) {
+  for (std::size_t k = 0; k < n; ++k) {
+    const Parcel& p = parcels[k];
+    for (const Parcel::Granule& g : p.granules) {
       if (g.record) solid_.know_radius(g.stored.type, g.radius);
-      const int* i = index_.find(tag);
+      const int* i = index_.find(g.tag);
       const bool here = i && shell_[*i].locked && shell_[*i].body == 0;  // an interface granule of a restart file
-      if (!solid_.bodies().body_of(tag) && (here || ports_.ranks.owns(p.bodies.at(g.body).pose.to_world(g.place))))
-        taken.emplace(tag, Taken{&p, &g});
+      if (!solid_.bodies().body_of(g.tag) && (here || ports_.ranks.owns(p.sender->bodies.at(g.body).pose.to_world(g.place))))
+        taken.emplace(g.tag, Taken{&p, &g});
     }
-  take_contacts(parcels, taken);
-  for (const auto& [tag, t] : taken) take_granule(tag, t);
+  }
+  for (std::size_t k = 0; k < n; ++k) take_contacts(parcels[k], taken);
+  for (const auto& [tag, t] : taken) {
+    take_granule(tag, t);
+    if (t.granule->record) taken_in_.push_back(tag);
+  }
+}
+
+void Parcels::end_taking() {
   adopt_places(ports_.atoms, solid_, shell_, arrivals_);
   solid_.turn_frozen();
-  for (const auto& [tag, t] : taken)
-    if (t.granule->record) solid_.enter_store(tag);
+  for (const std::int64_t tag : taken_in_) solid_.enter_store(tag);
+  taken_in_ = {};
   groups_.settle();
 }
 

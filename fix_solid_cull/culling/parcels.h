@@ -1,9 +1,10 @@
-// Granules with their bodies and contacts as numbers: into a restart file, out of one on any number of ranks, and to the rank
-// that owns a place now.
+// Granules with their bodies and contacts: as numbers to the rank that owns a place now, and taken up there, or out of a restart
+// file.
 #pragma once
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <vector>
 
 #include "atom_index.h"
@@ -16,13 +17,21 @@
 
 namespace solidcull {
 
-/// What one rank wrote. Its numbers must outlive it.
+/// A rank that sent or wrote granules, with its bodies.
+struct Sender {
+  int rank = 0;
+  Pose observer, observed_then;  // see Cover
+  std::vector<SolidBody> bodies;
+};
+
+/// Granules and contacts of one rank. What its pointers point to must outlive it.
 struct Parcel {
   static constexpr int no_record = -1;
   struct Granule {
+    std::int64_t tag;
     double mass, radius;
     bool held;
-    int body;    ///< in `bodies`
+    int body;    ///< of the sender
     Vec3 place;  ///< in its frame (m)
     StoredGranule stored;
     const double* record = nullptr;  ///< of an interior granule; none of an interface granule
@@ -31,12 +40,10 @@ struct Parcel {
   struct Edge {
     std::int64_t low, high;
     int body;
-    std::vector<double> history;  ///< as low sees it, frame of the body
+    const double* history;  ///< as low sees it, frame of the body; or none
   };
-  int rank;
-  Pose observer, observed_then;  // see Cover
-  std::vector<SolidBody> bodies;
-  std::map<std::int64_t, Granule> granules;  ///< by tag
+  std::shared_ptr<const Sender> sender;
+  std::vector<Granule> granules;
   std::vector<Edge> edges;
 };
 
@@ -54,20 +61,28 @@ class Parcels {
         groups_(groups),
         cover_(cover) {}
 
-  /// Stored granules and interface granules with their bodies, and contacts of theirs; `all`: everything that is locked here.
-  /// Local.
-  std::vector<double> pack(const std::vector<std::int64_t>& stored, const std::vector<std::int64_t>& interface_tags,
-                           bool all) const;
+  /// Stored granules and interface granules with their bodies, and contacts of theirs. Local.
+  std::vector<double> pack(const std::vector<std::int64_t>& stored, const std::vector<std::int64_t>& interface_tags) const;
   /// width: numbers of a contact history. Local.
   std::vector<Parcel> unpack(const double* numbers, std::size_t n, std::size_t width);
 
-  /// Whether this rank holds all that is in it, and locked atoms that are in it only. Local.
-  bool is_whole_rank(const Parcel& p) const;
-  /// Everything as it was, to the last bit. Collective.
-  void take_up_as_it_was(const Parcel& p);
   /// Each rank takes the granules whose places it owns, with the motion that they have in their bodies, and ties them together
   /// anew. Collective.
-  void take_up(const std::vector<Parcel>& parcels);
+  void take_up(const std::vector<Parcel>& parcels) {
+    begin_taking();
+    take(parcels.data(), parcels.size());
+    end_taking();
+  }
+  /// The same in many pieces; a contact comes with the later one of its granules, or before. Local, but for the end.
+  void begin_taking() { solid_.stands_otherwise(); }
+  void take(const Parcel* parcels, std::size_t n);
+  void end_taking();
+
+  /// Everything as it was, to the last bit, on the rank that wrote it: first its bodies, then its parcels, in the order in which
+  /// they were written. Local, but for the end.
+  void begin_as_it_was(const Sender& sender);
+  void take_as_it_was(const Parcel& parcel);
+  void end_as_it_was();
 
  private:
   struct Taken {
@@ -75,7 +90,7 @@ class Parcels {
     const Parcel::Granule* granule;
   };
   void take_granule(std::int64_t tag, const Taken& t);
-  void take_contacts(const std::vector<Parcel>& parcels, const std::map<std::int64_t, Taken>& taken);
+  void take_contacts(const Parcel& parcel, const std::map<std::int64_t, Taken>& taken);
 
   const Ports& ports_;
   const Scales& scales_;
@@ -86,6 +101,8 @@ class Parcels {
   Arrivals& arrivals_;
   BodyGroups& groups_;
   Cover& cover_;
+  std::vector<std::int64_t> taken_in_;  // stored granules, until the end
+  std::vector<int> number_;             // here, of the sender's bodies
 };
 
 }  // namespace solidcull

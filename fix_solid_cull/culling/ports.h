@@ -66,8 +66,8 @@ class Atoms {
   bool is_interface(int i) const { return (groups[i] & interface_bit) != 0; }
   void mark_interface(int i, bool on) { on ? groups[i] |= interface_bit : groups[i] &= ~interface_bit; }
   /// An integrator moves it, all the gravity there is pulls it, and nothing else holds or drives it.
-  bool may_be_culled(int i) const {
-    const int g = groups[i];
+  bool may_be_culled(int i) const { return groups_may_be_culled(groups[i]); }
+  bool groups_may_be_culled(int g) const {
     return (g & own_bit) && (g & movable_bits) && !(g & held_bits) && (g & gravity_bits) == gravity_bits;
   }
 
@@ -76,6 +76,8 @@ class Atoms {
   /// Which numbers of a record are position (where `positions`), velocity and spin (where `spins`); found by trying them on owned
   /// granule i.
   virtual std::vector<int> motion_words(int i, bool positions, bool spins) = 0;
+  /// The groups (bits) of the granule of a record. Only where atoms may be made.
+  virtual int groups_of(const std::vector<double>& record, int layout) = 0;
   /// Deletes owned granule i; the last owned granule takes its index. Only while membership changes.
   virtual void take_out(int i) = 0;
   /// A granule from its record; returns its index. Only while membership changes.

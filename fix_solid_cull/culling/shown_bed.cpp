@@ -8,10 +8,6 @@
 namespace solidcull {
 namespace {
 
-// more comparisons than this of granules that wake with granules that may: all wake at once
-constexpr double most_comparisons = 2e8;
-// likewise where more than this share of all that is locked was changed
-constexpr double most_changed = 0.25;
 // so many granules' rows are kept for the next time: decks loop over commands and runs
 constexpr std::size_t worth_freeing = 100000;
 
@@ -108,17 +104,8 @@ void ShownBed::hide() {
   std::sort(guests.rbegin(), guests.rend());
   for (const int i : guests) atoms.take_out(i);
 
-  std::int64_t counts[3] = {static_cast<std::int64_t>(changes_.size()), static_cast<std::int64_t>(asking_.size()),
-                            static_cast<std::int64_t>(solid_.locked())};
-  ports_.ranks.sum(counts, 3);
-  changed_ = counts[0] > 0;
-  const double asking = static_cast<double>(counts[1]), locked = static_cast<double>(counts[2]);
-  if (asking > most_changed * locked || asking * locked > most_comparisons) {
-    if (asking > 0) wake_.ask_all();
-  } else {
-    for (const std::int64_t number : asking_)
-      wake_.ask(granules_[static_cast<std::size_t>(number)].place, scales_.wake_up().radius(1));
-  }
+  changed_ = ports_.ranks.any(!changes_.empty());
+  wake_.ask_many(ports_.ranks, asking_, scales_.wake_up().radius(1), solid_.locked());
   shown_ = false;
   if (granules_.capacity() < worth_freeing) return;
   names_ = {};
@@ -173,7 +160,7 @@ bool ShownBed::is_as_shown(const Shown& s, int i) const {
 void ShownBed::judge(std::size_t number, int i) {
   const Shown& s = granules_[number];
   Atoms& atoms = ports_.atoms;
-  const auto wakes = [&] { asking_.push_back(static_cast<std::int64_t>(number)); };
+  const auto wakes = [&] { asking_.push_back(s.place); };
   if (i == gone) {
     wakes();
     changes_[s.tag].deleted = true;

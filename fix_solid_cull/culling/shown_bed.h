@@ -95,7 +95,7 @@ class ShownBed : public FollowsAtoms {
   std::vector<Interface> interface_;  // by number: the first ones are interface granules
   std::vector<int> motion_words_;     // of a record, in their order
   std::vector<double> record_;        // of one granule
-  std::vector<std::int64_t> asking_;  // those that are to wake
+  std::vector<Vec3> asking_;          // places of those that are to wake
   std::map<std::int64_t, Change> changes_;
 };
 

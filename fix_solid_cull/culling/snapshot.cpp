@@ -12,8 +12,8 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261126;  // the format's version
-/// The numbers before the ranks' parcels. A check sum follows them.
+constexpr double file_mark = 20261123;  // the format's version
+/// The numbers in the file's head. The largest stored radius of each type and a check sum follow them.
 enum Header {
   mark,
   size_again,
@@ -26,52 +26,53 @@ enum Header {
   ranks,
   step,
   no_places,
+  has_section,
+  identity_high,
+  identity_low,
+  types,
   header_size
 };
 constexpr std::size_t check_sum_size = 2;
+constexpr double most_types = 1e6;
 
 /// In two halves that doubles hold exactly.
+std::array<double, 2> halves(std::uint64_t word) {
+  return {static_cast<double>(word >> 32), static_cast<double>(word & 0xffffffffu)};
+}
+std::uint64_t joined(const double* halves) {
+  return static_cast<std::uint64_t>(halves[0]) << 32 | static_cast<std::uint64_t>(halves[1]);
+}
 std::array<double, check_sum_size> check_sum(const double* numbers, std::size_t n) {
   WordSum sum;
   for (std::size_t k = 0; k < n; ++k) sum.add(numbers[k]);
-  return {static_cast<double>(sum.value() >> 32), static_cast<double>(sum.value() & 0xffffffffu)};
+  return halves(sum.value());
 }
 
 constexpr const char* damaged = "the restart file is damaged where it holds this fix's granules: use another one";
 
 }  // namespace
 
+// ------------------------------------------------------------------------------------------------------------ out
+
 std::vector<double> Snapshot::write() {
-  std::vector<std::int64_t> stored, interface_tags;
-  std::vector<double> mine;
   index_.index(ports_.atoms);
-  if (solid_.has_store()) {
-    solid_.store().for_each([&](const Resident& g) { stored.push_back(g.tag); });
-    std::sort(stored.begin(), stored.end());
-    for (int i = 0; i < ports_.atoms.owned; ++i)
-      if (shell_[i].locked) interface_tags.push_back(ports_.atoms.tag[i]);
-    mine = parcels_.pack(stored, interface_tags, true);
-  }
+  const bool store = solid_.has_store();
   Ledger::Counters sums = solid_.ledger().counters();
   const double carves = sums[Ledger::carves_counter];
   ports_.ranks.sum(sums.data(), Ledger::counters_size);
   sums[Ledger::carves_counter] = carves;
-  std::int64_t in_file[2] = {static_cast<std::int64_t>(mine.size()), static_cast<std::int64_t>(stored.size())};
-  ports_.ranks.sum(in_file, 2);
-  const std::int64_t size = in_file[0] + 1 + header_size + static_cast<std::int64_t>(check_sum_size);
-  constexpr std::int64_t bytes = sizeof(double), gib = std::int64_t{1} << 30;
-  if (size * bytes > INT32_MAX)
-    throw InputError("the store needs " + std::to_string(size * bytes / gib + 1) +
-                     " GiB and LIGGGHTS's restart format holds 2 GiB for a fix: unfix " + ports_.run.name +
-                     " before write_restart");
-  std::vector<double> all = ports_.ranks.gather_on_root(mine);
+  std::int64_t stored = store ? static_cast<std::int64_t>(solid_.store().size()) : 0;
+  ports_.ranks.sum(&stored, 1);
+  std::vector<double> radii = solid_.largest_radius_by_type();
+  ports_.ranks.largest(radii.data(), static_cast<int>(radii.size()));
+  identity_ = store ? ChunkSource::identity(ports_, solid_, shell_) : 0;
   if (ports_.ranks.me != 0) return {};
   std::vector<double> state(1 + header_size);
-  state[0] = static_cast<double>(size);
+  state[0] = static_cast<double>(state.size() + radii.size() + check_sum_size);
   double* const h = &state[1];
   h[mark] = file_mark;
   h[size_again] = state[0];
-  h[interior] = static_cast<double>(in_file[1]);
+  h[interior] = static_cast<double>(stored);
   h[diameter] = scales_.diameter();
   h[gravity] = scales_.gravity();
   set(h + gravity_x, gravity_.at_last_look());
@@ -80,12 +81,38 @@ std::vector<double> Snapshot::write() {
   h[ranks] = ports_.ranks.count;
   h[step] = static_cast<double>(ports_.run.step);
   h[no_places] = scales_.refills();
-  state.reserve(static_cast<std::size_t>(size));
-  state.insert(state.end(), all.begin(), all.end());
+  h[has_section] = store;
+  const auto name = halves(identity_);
+  std::copy(name.begin(), name.end(), h + identity_high);
+  h[types] = static_cast<double>(radii.size());
+  state.insert(state.end(), radii.begin(), radii.end());
   const auto sum = check_sum(state.data(), state.size());
   state.insert(state.end(), sum.begin(), sum.end());
   return state;
 }
+
+void Snapshot::append_to(const std::string& file) {
+  if (!solid_.has_store()) return;
+  SectionWriter out(ports_.ranks, file, identity_);
+  std::int64_t counts[3] = {0, 0, 0};
+  for (int rank = 0; rank < ports_.ranks.count; ++rank) {
+    const bool mine = rank == ports_.ranks.me;
+    ChunkSource source(ports_, solid_, shell_, index_, cover_);
+    for (SectionChunk chunk; ports_.ranks.any(mine && source.next(chunk)); chunk.bytes.clear()) out.put(chunk);
+    if (!mine) continue;
+    counts[0] = static_cast<std::int64_t>(source.interior());
+    counts[1] = static_cast<std::int64_t>(source.interface_granules());
+    counts[2] = static_cast<std::int64_t>(source.contacts());
+  }
+  ports_.ranks.sum(counts, 3);
+  SectionCounts whole;
+  whole.interior = static_cast<std::uint64_t>(counts[0]);
+  whole.interface_granules = static_cast<std::uint64_t>(counts[1]);
+  whole.contacts = static_cast<std::uint64_t>(counts[2]);
+  out.close(whole);
+}
+
+// ------------------------------------------------------------------------------------------------------------ in
 
 std::vector<double> Snapshot::from_bytes(const char* bytes) {
   std::vector<double> state(1 + header_size);
@@ -93,7 +120,8 @@ std::vector<double> Snapshot::from_bytes(const char* bytes) {
   if (state[1 + mark] != file_mark)
     throw InputError("the restart file was written by another version of solidcull: write it again with this one");
   const double n = state[0];
-  if (!(n >= 1 + header_size + check_sum_size && n <= INT32_MAX / sizeof(double)) || state[1 + size_again] != n)
+  if (!(n >= 1 + header_size + check_sum_size && n <= most_types) || state[1 + size_again] != n ||
+      n != 1 + header_size + state[1 + types] + check_sum_size)
     throw InputError(damaged);
   state.resize(static_cast<std::size_t>(n));
   std::memcpy(state.data(), bytes, state.size() * sizeof(double));
@@ -105,9 +133,14 @@ std::vector<double> Snapshot::from_bytes(const char* bytes) {
 
 std::int64_t Snapshot::interior_of(const std::vector<double>& state) { return static_cast<std::int64_t>(state[1 + interior]); }
 
-void Snapshot::read(const std::vector<double>& state) {
+void Snapshot::read(const std::vector<double>& state, const std::string& file) {
   state_.assign(state.begin() + 1, state.end() - check_sum_size);
+  file_ = file;
   const double* const h = state_.data();
+  if (h[has_section] != 0) {
+    const SectionReader section(ports_.ranks, file_, joined(h + identity_high));
+    if (section.counts().interior != static_cast<std::uint64_t>(h[interior])) throw InputError(damaged);
+  }
   scales_.set(h[diameter], h[gravity]);
   gravity_.set_at_last_look(vec(h + gravity_x));
   const std::int64_t then = static_cast<std::int64_t>(h[step]);
@@ -119,9 +152,9 @@ void Snapshot::read(const std::vector<double>& state) {
   solid_.set_counters(counted);
 
   // the neighbour cut-off is set before the store is taken up: it must know the largest stored radius
-  for (const Parcel& p : parcels_.unpack(h + header_size, state_.size() - header_size, static_cast<std::size_t>(h[width])))
-    for (const auto& g : p.granules)
-      if (g.second.record) solid_.know_radius(g.second.stored.type, g.second.radius);
+  const int known =
+      static_cast<int>(std::min<std::size_t>(solid_.largest_radius_by_type().size(), static_cast<std::size_t>(h[types])));
+  for (int type = 1; type < known; ++type) solid_.know_radius(type, h[header_size + type]);
 }
 
 void Snapshot::take_up() {
@@ -135,14 +168,80 @@ void Snapshot::take_up() {
   if ((h[no_places] != 0) != scales_.refills() && h[interior] > 0)
     throw InputError(std::string("the restart file was written with 'store ") +
                      (scales_.refills() ? "exact' or 'compact" : "none") + "': read it with that store");
+  if (h[has_section] == 0) return;
+  const std::uint64_t identity = joined(h + identity_high);
   index_.index(ports_.atoms);
-  const std::vector<Parcel> parcels = parcels_.unpack(h + header_size, state.size() - header_size, solid_.contacts().width());
-  const bool same_ranks =
-      static_cast<int>(h[ranks]) == ports_.ranks.count && static_cast<int>(parcels.size()) == ports_.ranks.count;
-  if (same_ranks && !ports_.ranks.any(!parcels_.is_whole_rank(parcels[ports_.ranks.me])))
-    parcels_.take_up_as_it_was(parcels[ports_.ranks.me]);
-  else
-    parcels_.take_up(parcels);
+  take(identity, static_cast<int>(h[ranks]) == ports_.ranks.count && stands_as_it_was(identity));
+}
+
+/// Whether this rank holds what is in the parcel.
+bool Snapshot::holds(const Parcel& p) const {
+  return std::all_of(p.granules.begin(), p.granules.end(), [&](const Parcel::Granule& g) {
+    return g.record ? ports_.ranks.owns(p.sender->bodies.at(static_cast<std::size_t>(g.body)).pose.to_world(g.place))
+                    : index_.contains(g.tag);
+  });
+}
+
+/// Whether each rank holds all that it wrote, and locked atoms that it wrote only.
+bool Snapshot::stands_as_it_was(std::uint64_t identity) const {
+  std::int64_t locked = 0;
+  for (int i = 0; i < ports_.atoms.owned; ++i) locked += shell_[i].locked;
+  bool same = true, moved = false;  // moved: the borders of the subdomain
+  SectionReader section(ports_.ranks, file_, identity);
+  ChunkReader reader(ports_, scales_, solid_.contacts().width());
+  const auto mine = [&](const SectionChunk& c) { return c.rank == static_cast<std::uint64_t>(ports_.ranks.me); };
+  SectionChunk chunk;
+  while (section.next(chunk, [](const SectionChunk& c) { return c.kind != SectionChunk::interior_granules; })) {
+    if (!mine(chunk) || chunk.kind == SectionChunk::interior_granules) continue;
+    if (chunk.kind == SectionChunk::part) {
+      const Box& then = reader.part(chunk).own;
+      moved = moved || then.lo != ports_.run.own.lo || then.hi != ports_.run.own.hi;
+    } else {
+      locked -= static_cast<std::int64_t>(chunk.granules);
+      same = same && holds(reader.parcel(chunk));
+    }
+  }
+  if (ports_.ranks.any(!same || locked != 0)) return false;
+  if (ports_.ranks.count == 1 || !ports_.ranks.any(moved)) return true;
+  SectionReader again(ports_.ranks, file_, identity);
+  while (again.next(chunk)) {
+    if (!mine(chunk)) continue;
+    if (chunk.kind == SectionChunk::part)
+      reader.part(chunk);
+    else
+      same = same && holds(reader.parcel(chunk));
+  }
+  return !ports_.ranks.any(!same);
+}
+
+void Snapshot::take(std::uint64_t identity, bool as_it_was) {
+  SectionReader section(ports_.ranks, file_, identity);
+  ChunkReader reader(ports_, scales_, solid_.contacts().width());
+  SectionCounts read;
+  if (!as_it_was) parcels_.begin_taking();
+  for (SectionChunk chunk; section.next(chunk);) {
+    ++read.chunks;
+    if (chunk.kind == SectionChunk::interior_granules) read.interior += chunk.granules;
+    if (chunk.kind == SectionChunk::interface_granules) read.interface_granules += chunk.granules;
+    if (as_it_was && chunk.rank != static_cast<std::uint64_t>(ports_.ranks.me)) continue;
+    if (chunk.kind == SectionChunk::part) {
+      const ChunkReader::Head& head = reader.part(chunk);
+      if (as_it_was) parcels_.begin_as_it_was(*head.sender);
+    } else if (as_it_was) {
+      parcels_.take_as_it_was(reader.parcel(chunk));
+    } else {
+      parcels_.take(&reader.parcel(chunk), 1);
+    }
+  }
+  const SectionCounts& due = section.counts();
+  if (read.chunks != due.chunks || read.interior != due.interior || read.interface_granules != due.interface_granules)
+    throw InputError(damaged);
+  as_it_was ? parcels_.end_as_it_was() : parcels_.end_taking();
+  std::int64_t stored = static_cast<std::int64_t>(solid_.store().size());
+  ports_.ranks.sum(&stored, 1);
+  if (stored != static_cast<std::int64_t>(due.interior))
+    throw InternalError("of " + std::to_string(due.interior) + " interior granules of the restart file " +
+                        std::to_string(stored) + " were taken up");
 }
 
 }  // namespace solidcull

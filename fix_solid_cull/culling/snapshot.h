@@ -1,4 +1,4 @@
-// The culled state in a restart file.
+// The culled state in a restart file: a few numbers in the file's head, and the section with what is culled at its end.
 #pragma once
 
 #include <cstdint>
@@ -9,30 +9,47 @@
 #include "parcels.h"
 #include "ports.h"
 #include "scales.h"
+#include "section_chunks.h"
 #include "solid.h"
+#include "store_section.h"
 
 namespace solidcull {
 
 class Snapshot {
  public:
   Snapshot(const Ports& ports, Scales& scales, Solid& solid, const Shell& shell, AtomIndex& index, Parcels& parcels,
-           EffectiveGravity& gravity)
-      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), index_(index), parcels_(parcels), gravity_(gravity) {}
+           EffectiveGravity& gravity, const Cover& cover)
+      : ports_(ports),
+        scales_(scales),
+        solid_(solid),
+        shell_(shell),
+        index_(index),
+        parcels_(parcels),
+        gravity_(gravity),
+        cover_(cover) {}
 
-  /// On rank 0 the numbers of the whole state, the first of them how many they are; empty elsewhere. InputError where a restart
-  /// file cannot hold them. Collective.
+  /// On rank 0 the numbers for the file's head, the first of them how many they are; empty elsewhere. Collective.
   std::vector<double> write();
+  /// The section that goes with them, at the end of the file; nothing may have changed since. InputError where it could not be
+  /// written. Collective.
+  void append_to(const std::string& file);
+
   /// What write() gave, of its bytes, which need not be aligned. InputError for what another version wrote, or what is not what
   /// was written. Local.
   static std::vector<double> from_bytes(const char* bytes);
-  static std::int64_t interior_of(const std::vector<double>& state);  ///< granules that it holds besides atoms
-  /// Scales, counters and largest radii are known at once, the rest waits for take_up(). Local.
-  void read(const std::vector<double>& state);
+  static std::int64_t interior_of(const std::vector<double>& state);  ///< granules that the file holds besides atoms
+  /// Scales, counters and largest radii are known at once, the rest waits in the file for take_up(). InputError for a file whose
+  /// section is not there, or is that of another file. Collective.
+  void read(const std::vector<double>& state, const std::string& file);
   bool waits() const { return !state_.empty(); }
-  /// Once there are atoms. InputError for another contact model. Collective.
+  /// Once there are atoms. InputError for another contact model, or a damaged file. Collective.
   void take_up();
 
  private:
+  bool stands_as_it_was(std::uint64_t identity) const;
+  bool holds(const Parcel& parcel) const;
+  void take(std::uint64_t identity, bool as_it_was);
+
   const Ports& ports_;
   Scales& scales_;
   Solid& solid_;
@@ -40,7 +57,10 @@ class Snapshot {
   AtomIndex& index_;
   Parcels& parcels_;
   EffectiveGravity& gravity_;
-  std::vector<double> state_;
+  const Cover& cover_;
+  std::vector<double> state_;   // of the file's head
+  std::string file_;            // that was read
+  std::uint64_t identity_ = 0;  // of the file that is being written
 };
 
 }  // namespace solidcull

@@ -41,6 +41,20 @@ class WakeRequests {
   void ask(const Vec3& centre, double radius) { balls_.push_back({centre, radius}); }
   void ask_body(int key) { bodies_.insert(key); }
   void ask_all() { all_ = true; }
+  /// A ball around each place. Where these are a large share of the granules that are locked, `locked` on this rank, or would
+  /// take long to compare with them, all wakes. Collective.
+  void ask_many(const Ranks& ranks, const std::vector<Vec3>& places, double radius, std::size_t locked) {
+    constexpr double most = 0.25;             // of all that is locked
+    constexpr double most_comparisons = 2e8;  // of granules that wake with granules that may
+    std::int64_t counts[2] = {static_cast<std::int64_t>(places.size()), static_cast<std::int64_t>(locked)};
+    ranks.sum(counts, 2);
+    const double asking = static_cast<double>(counts[0]), all = static_cast<double>(counts[1]);
+    if (asking > most * all || asking * all > most_comparisons) {
+      if (asking > 0) ask_all();
+    } else {
+      for (const Vec3& place : places) ask(place, radius);
+    }
+  }
 
   bool any_here() const { return !balls_.empty() || !bodies_.empty(); }  ///< but for ask_all()
   bool asks_body(int key) const { return bodies_.count(key) != 0; }

@@ -62,6 +62,16 @@ void EngineAtoms::take_out(int i) {
   renew();
 }
 
+/// Which word it is, one granule tells for all: it becomes an atom for a moment.
+int EngineAtoms::groups_of(const std::vector<double>& record, int layout) {
+  if (groups_word_ < 0) {
+    const int i = put_back(record, layout);
+    groups_word_ = records_.groups_word(i);
+    take_out(i);
+  }
+  return GranuleRecords::whole_number(record[static_cast<std::size_t>(groups_word_)]);
+}
+
 int EngineAtoms::put_back(const std::vector<double>& record, int layout) {
   clear_map();
   const int i = records_.append(record, layout);

@@ -24,6 +24,7 @@ class EngineAtoms : public Atoms, protected LAMMPS_NS::Pointers {
 
   void pack(int i, std::vector<double>& record, int& layout) override { records_.pack(i, record, layout); }
   std::vector<int> motion_words(int i, bool positions, bool spins) override { return records_.motion_words(i, positions, spins); }
+  int groups_of(const std::vector<double>& record, int layout) override;
   void take_out(int i) override;
   int put_back(const std::vector<double>& record, int layout) override;
   void wrap(int i) override;
@@ -42,6 +43,7 @@ class EngineAtoms : public Atoms, protected LAMMPS_NS::Pointers {
   const LAMMPS_NS::Fix* own_;
   GranuleRecords records_;
   bool map_cleared_ = false;
+  int groups_word_ = -1;  // of a record; unknown at first
 };
 
 }  // namespace solidcull

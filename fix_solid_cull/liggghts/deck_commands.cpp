@@ -16,6 +16,7 @@
 #include "modify.h"
 #include "neigh_request.h"
 #include "neighbor.h"
+#include "restart_files.h"
 #include "update.h"
 
 namespace solidcull {
@@ -26,14 +27,6 @@ std::set<const LAMMPS_NS::LAMMPS*> with_void_lists;
 bool histories_stay = false;  // in delete_atoms
 
 bool lists_are_void(const LAMMPS_NS::LAMMPS* lmp) { return with_void_lists.count(lmp) != 0; }
-
-FixSolidCull* fix_of(LAMMPS_NS::LAMMPS* lmp) {
-  if (!lmp->modify) return nullptr;
-  for (int f = 0; f < lmp->modify->nfix; ++f)
-    if (lmp->modify->fix[f] && std::strcmp(lmp->modify->fix[f]->style, "solid/cull") == 0)
-      return static_cast<FixSolidCull*>(lmp->modify->fix[f]);
-  return nullptr;
-}
 
 bool needs_lists(LAMMPS_NS::LAMMPS* lmp, const LAMMPS_NS::Compute* c) {
   const LAMMPS_NS::Neighbor* neighbor = lmp->neighbor;
@@ -99,6 +92,14 @@ bool is_own_line(const char* command, char** words, int n) {
 
 }  // namespace
 
+FixSolidCull* fix_of(LAMMPS_NS::LAMMPS* lmp) {
+  if (!lmp->modify) return nullptr;
+  for (int f = 0; f < lmp->modify->nfix; ++f)
+    if (lmp->modify->fix[f] && std::strcmp(lmp->modify->fix[f]->style, "solid/cull") == 0)
+      return static_cast<FixSolidCull*>(lmp->modify->fix[f]);
+  return nullptr;
+}
+
 MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, char** words, int& n) : lmp_(lmp) {
   if (!lmp->modify) return;
   FixSolidCull* fix = fix_of(lmp);
@@ -114,6 +115,7 @@ MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, 
     if (sight == Sight::whole_bed && !leaves_culled_alone(lmp, *fix, only_group_of(command, line))) show(lmp, *fix);
     if (sight == Sight::all_restored) fix->restore_all(command);
   }
+  if (n == 1 && std::strcmp(command, "read_restart") == 0) remember_read(lmp, words[0]);
   histories_stay = lists_are_void(lmp) && std::strcmp(command, "delete_atoms") == 0;
   step_ = lmp->update->ntimestep;
   resets_ = std::strcmp(command, "reset_timestep") == 0;

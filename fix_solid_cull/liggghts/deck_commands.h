@@ -9,6 +9,10 @@ class LAMMPS;
 
 namespace solidcull {
 
+class FixSolidCull;
+/// The deck's fix solid/cull; nullptr if it has none. Local.
+FixSolidCull* fix_of(LAMMPS_NS::LAMMPS* lmp);
+
 /// Lives while the engine works on a command. Collective.
 class MetCommand {
  public:

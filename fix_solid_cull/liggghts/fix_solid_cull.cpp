@@ -14,6 +14,7 @@
 #include "error.h"
 #include "input_error.h"
 #include "interpositions.h"
+#include "restart_files.h"
 #include "run_failure.h"
 #include "settings.h"
 #include "update.h"
@@ -363,15 +364,30 @@ void FixSolidCull::write_restart(FILE* file) {
   const std::vector<double> state = hand_on([&] { return culling_->restart_state(); });
   if (comm->me != 0) return;
   const int bytes = static_cast<int>(state.size() * sizeof(double));
+  errno = 0;
   const bool written = std::fwrite(&bytes, sizeof(int), 1, file) == 1 &&
                        std::fwrite(state.data(), sizeof(double), state.size(), file) == state.size() && std::fflush(file) == 0;
-  if (!written)
-    fail("the restart file could not be written (" + std::string(std::strerror(errno)) +
-         "): it is not whole, delete it; make room, or write it elsewhere");
+  write_error_ = written ? 0 : errno ? errno : EIO;
+}
+
+void FixSolidCull::append_restart(const std::string& file) {
+  hand_on([&] {
+    std::int64_t error = write_error_;
+    ranks_.largest(&error, 1);
+    try {
+      if (error)
+        throw InputError("the restart file could not be written (" + std::string(std::strerror(static_cast<int>(error))) +
+                         "): make room, or write it elsewhere");
+      culling_->append_restart(file);
+    } catch (const InputError&) {
+      if (comm->me == 0) std::remove(file.c_str());
+      throw;
+    }
+  });
 }
 
 void FixSolidCull::restart(char* buffer) {
-  hand_on([&] { culling_->read_restart_state(buffer); });
+  hand_on([&] { culling_->read_restart_state(buffer, file_that_was_read(lmp)); });
 }
 
 }  // namespace solidcull

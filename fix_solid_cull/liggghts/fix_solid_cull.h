@@ -61,6 +61,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   int maxsize_restart() override;
   void write_restart(FILE* file) override;
   void restart(char* buffer) override;
+  /// What is culled, at the end of the file whose head write_restart() has written. Collective.
+  void append_restart(const std::string& file);
 
   const std::map<int, InterfaceMesh>& interface_meshes() override;
 
@@ -103,6 +105,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   DeckRules rules_;
   std::unique_ptr<Culling> culling_;
   bool in_run_ = false;
+  int write_error_ = 0;  // of the restart file's head
 };
 
 }  // namespace solidcull

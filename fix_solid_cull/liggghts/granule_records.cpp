@@ -8,6 +8,7 @@
 #include "atom.h"
 #include "atom_vec.h"
 #include "fix.h"
+#include "internal_error.h"
 #include "modify.h"
 
 namespace solidcull {
@@ -106,6 +107,22 @@ std::vector<int> GranuleRecords::motion_words(int i, bool positions, bool spins)
   std::sort(words.begin(), words.end());
   return words;
 }
+
+int GranuleRecords::groups_word(int i) {
+  std::vector<double> packed(longest_column);
+  AtomStyleOnly guard(atom);
+  constexpr int unlikely = 0x35a9c6e3;
+  const int kept = atom->mask[i];
+  atom->mask[i] = unlikely;
+  const int length = atom->avec->pack_exchange(i, packed.data());
+  atom->mask[i] = kept;
+  for (int w = 0; w < length; ++w)
+    if (whole_number(packed[static_cast<std::size_t>(w)]) == unlikely) return w;
+  throw InternalError("the groups of a granule do not stand in its record");
+}
+
+/// The engine packs whole numbers by their bits.
+int GranuleRecords::whole_number(double packed) { return static_cast<int>(bits(packed)); }
 
 void GranuleRecords::remove(int i) {
   if (i != atom->nlocal - 1) atom->avec->copy(atom->nlocal - 1, i, 1);

@@ -21,6 +21,9 @@ class GranuleRecords : protected LAMMPS_NS::Pointers {
   /// Which numbers of a record are position, velocity and spin (position only where `positions`), by trying them on owned granule
   /// i.
   std::vector<int> motion_words(int i, bool positions, bool spins);
+  /// Which number of a record is the granule's groups, likewise; and such a number as it is packed.
+  int groups_word(int i);
+  static int whole_number(double packed);
   /// Deletes owned granule i; the last owned granule takes its index.
   void remove(int i);
   /// Appends a granule from its record and returns its index. Fixes that were not there when it was packed set their defaults.

@@ -7,7 +7,17 @@
 
 namespace solidcull::engine {
 
-enum class Call { add_fix, begin_run, count_fixes, deck_command, formula, add_region, mesh_contact, neighbor_build };
+enum class Call {
+  add_fix,
+  begin_run,
+  count_fixes,
+  deck_command,
+  formula,
+  add_region,
+  mesh_contact,
+  neighbor_build,
+  write_restart
+};
 
 struct Interposed {
   Call call;
@@ -25,6 +35,7 @@ inline constexpr Interposed interposed[] = {
     {Call::mesh_contact, "_ZN9LAMMPS_NS14FixMeshSurface25add_particle_contributionEiPdS1_iS1_",
      "FixMeshSurface::add_particle_contribution"},
     {Call::neighbor_build, "_ZN9LAMMPS_NS8Neighbor22granular_bin_no_newtonEPNS_9NeighListE", "Neighbor::granular_bin_no_newton"},
+    {Call::write_restart, "_ZN9LAMMPS_NS12WriteRestart5writeEPc", "WriteRestart::write"},
 };
 
 /// Where it is asked for in a constant expression, a call that is not in the list does not compile.

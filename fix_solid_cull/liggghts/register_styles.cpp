@@ -17,10 +17,12 @@
 #include "mesh_loads.h"
 #include "modify.h"
 #include "region_interface_mesh.h"
+#include "restart_files.h"
 #include "solidcull.h"
 #include "update.h"
 #include "variable.h"
 #include "wall_contacts.h"
+#include "write_restart.h"
 
 namespace {
 
@@ -98,6 +100,15 @@ void Domain::add_region(int narg, char** arg) {
     add_interface_mesh(lmp, narg, arg);
   else
     original(this, narg, arg);
+}
+
+/// What is culled goes to the end of the file, which has its name when it is whole.
+void WriteRestart::write(char* file) {
+  using Original = void (*)(WriteRestart*, char*);
+  static const auto original = own<Call::write_restart, Original>();
+  solidcull::RestartFile whole(lmp, file);
+  original(this, whole.name());
+  whole.finish();
 }
 
 void FixMeshSurface::add_particle_contribution(int ip, double* frc, double* delta, int iTri, double* v_wall) {

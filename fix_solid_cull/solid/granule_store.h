@@ -162,6 +162,22 @@ class GranuleStore {
       visit(granule(s), record, transient_.of_tag.contains(tag_at(s)));
     }
   }
+  /// Calls visit(const StoredGranule&, record, its length) for as many as `most` from slot `from` on; the record's transient
+  /// words are 0. Returns the slot to go on from, slots() at the end.
+  template <class Visit>
+  int visit_some(int from, int most, Visit visit) const {
+    const int all = slots();
+    for (; from < all && most > 0; ++from) {
+      if (tag_at(from) == free_mark) continue;
+      const std::vector<std::uint64_t> row = row_of(from);
+      visit(granule(from), row.data() + record_begin, static_cast<int>(row.size() - record_begin - tail_of(row)));
+      --most;
+    }
+    return from;
+  }
+  int slots() const { return static_cast<int>(slots_.size()); }
+  /// Of two that are there: visit_some() comes to the first of them before the second.
+  bool comes_before(std::int64_t tag, std::int64_t other) const { return slot_of(tag) < slot_of(other); }
   /// Calls visit(const Resident&) for each granule of this body; costs what is in its box.
   template <class Visit>
   void for_each_of_body(int body, Visit visit) const {

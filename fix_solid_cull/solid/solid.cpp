@@ -164,6 +164,12 @@ void Solid::ground(int body, bool on) {
   find_grid(body);
 }
 
+int Solid::found(const SolidBody& body) {
+  const int number = bodies_.found(body);
+  if (body.grounded) find_grid(number);
+  return number;
+}
+
 void Solid::reframe_one(int body, const GranuleMass& in_world) {
   bodies_.body(body).reframe_one({in_world.mass, in_world.position, bodies_.turning_radius(in_world.radius), in_world.held});
   tell([&](BodyFollower& f) { f.frame_changed(body); });
@@ -249,6 +255,22 @@ void Solid::entered_store(std::int64_t tag) {
   });
   if (!tail.empty()) store_->set_tail(tag, tail);
   contacts_.drop(tag, [&](std::int64_t partner) { return store_->contains(partner); });
+}
+
+/// Granules that are there already did not know of this one when they went in: what it would be confused with goes.
+void Solid::enter_store(std::int64_t tag) {
+  if (scales_.compact()) {
+    std::vector<std::uint64_t> tail;
+    contacts_.for_each_partner(tag, [&](std::int64_t partner) {
+      if (!store_->contains(partner) || !contacts_.contains(tag, partner)) return;  // or it is packed there already
+      store_->tail(partner, tail);
+      const auto at = tail.begin() + static_cast<std::ptrdiff_t>(packed_.find(tail, tag));
+      if (at == tail.end()) return;
+      tail.erase(at, at + static_cast<std::ptrdiff_t>(packed_.words()));
+      store_->set_tail(partner, tail);
+    });
+  }
+  entered_store(tag);
 }
 
 /// What touched and has sites farther apart still hangs together: that stays in the graph.

@@ -147,10 +147,10 @@ class Solid {
   void forget_transient() { store_->forget_transient(); }
 
   // --- from a restart file or another rank; enter_store() once all contacts are there
-  int found(const SolidBody& body) { return bodies_.found(body); }
+  int found(const SolidBody& body);
   void take_in(std::int64_t tag, int body) { bodies_.take_in(tag, body); }
   void add_stored(const StoredGranule& g, const double* record, int length);
-  void enter_store(std::int64_t tag) { entered_store(tag); }
+  void enter_store(std::int64_t tag);
   void stands_otherwise() { ++standing_version_; }
 
   // --- walls

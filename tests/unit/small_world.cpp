@@ -343,6 +343,8 @@ std::vector<int> SmallAtoms::motion_words(int, bool positions, bool spins) {
   return numbers;
 }
 
+int SmallAtoms::groups_of(const std::vector<double>& record, int) { return static_cast<int>(record[groups_word]); }
+
 void SmallAtoms::take_out(int i) {
   ghosts = 0;
   world_.contacts.rows_are_invalid();

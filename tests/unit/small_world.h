@@ -105,6 +105,7 @@ class SmallAtoms : public Atoms {
   explicit SmallAtoms(SmallWorld& world);
   void pack(int i, std::vector<double>& record, int& layout) override;
   std::vector<int> motion_words(int i, bool positions, bool spins) override;
+  int groups_of(const std::vector<double>& record, int layout) override;
   void take_out(int i) override;
   int put_back(const std::vector<double>& record, int layout) override;
   void wrap(int i) override;

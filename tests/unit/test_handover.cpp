@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cstdio>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <set>
@@ -214,11 +216,17 @@ struct File {
     std::vector<std::vector<double>> followers;
   };
   std::vector<Atom> atoms;
-  std::vector<double> state;
+  std::vector<double> state;  // in its head
+  std::string end = ::testing::TempDir() + "solidcull-section-" + std::to_string(reinterpret_cast<std::uintptr_t>(this));
+
+  File() { std::remove(end.c_str()); }
+  ~File() { std::remove(end.c_str()); }
+  File(const File&) = delete;
 
   void write(SmallWorld& w, WorldParts& parts) {
     const std::vector<double> numbers = parts.snapshot.write();
     EXPECT_EQ(numbers.empty(), w.ranks.me != 0);
+    parts.snapshot.append_to(end);
     const std::lock_guard<std::mutex> lock(mutex);
     if (!numbers.empty()) state = numbers;
     for (int i = 0; i < w.atoms.owned; ++i) {
@@ -238,12 +246,45 @@ struct File {
       const int i = w.atoms.put_back(a.record, 0);
       for (std::size_t f = 0; f < a.followers.size(); ++f) w.atoms.followers[f]->unpack(i, a.followers[f].data());
     }
-    parts.snapshot.read(Snapshot::from_bytes(reinterpret_cast<const char*>(state.data())));
+    parts.snapshot.read(Snapshot::from_bytes(reinterpret_cast<const char*>(state.data())), end);
     EXPECT_TRUE(parts.snapshot.waits());
     parts.snapshot.take_up();
     EXPECT_FALSE(parts.snapshot.waits());
   }
 };
+
+std::string bytes_of(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// What the section holds, by rank and kind of chunk, whatever the order of its granules.
+std::multiset<std::vector<std::uint64_t>> rows_of(const File& file) {
+  std::multiset<std::vector<std::uint64_t>> rows;
+  SmallWorld alone(ranks_along_x(1));
+  const auto half = [&](std::size_t back) { return static_cast<std::uint64_t>(file.state[file.state.size() - back]); };
+  SectionReader section(alone.ranks, file.end, half(7) << 32 | half(6));  // types, two radii and the check sum follow
+  for (SectionChunk chunk; section.next(chunk);) {
+    const char *at = chunk.bytes.data(), *const end = at + chunk.bytes.size();
+    const auto tables = [&](std::uint64_t n) {
+      for (WordTable t; n > 0; --n) {
+        at = unpack_columns(at, end, t);
+        for (std::size_t r = 0; r < t.rows; ++r) {
+          std::vector<std::uint64_t> row = {chunk.rank, chunk.kind};
+          row.insert(row.end(), t.row(r), t.row(r) + t.columns);
+          rows.insert(row);
+        }
+      }
+    };
+    tables(chunk.kind == SectionChunk::part ? 3 : 2);
+    if (chunk.kind != SectionChunk::interior_granules) continue;
+    std::uint64_t more = 0;
+    std::memcpy(&more, at, sizeof more);
+    at += sizeof more;
+    tables(more);
+  }
+  return rows;
+}
 
 TEST(Snapshot, what_two_ranks_wrote_is_taken_up_by_any_number_of_ranks) {
   File file;
@@ -313,10 +354,8 @@ TEST(Snapshot, on_as_many_ranks_everything_is_as_it_was_to_the_last_bit) {
       first.read(w, parts);
       second.write(w, parts);
     });
-    ASSERT_EQ(first.state.size(), second.state.size());
-    std::size_t different = 0;
-    for (std::size_t k = 0; k < first.state.size(); ++k) different += first.state[k] != second.state[k];
-    EXPECT_EQ(different, 0u) << ranks;
+    EXPECT_EQ(first.state, second.state) << ranks;
+    EXPECT_TRUE(rows_of(first) == rows_of(second)) << ranks;
   }
 }
 
@@ -328,7 +367,7 @@ TEST(Snapshot, the_users_faults_are_named) {
   });
   SmallWorld world(ranks_along_x(1));
   WorldParts parts(world, sleeping_settings(), 2 * r);
-  parts.snapshot.read(file.state);
+  parts.snapshot.read(file.state, file.end);
   world.contacts.width = 0;  // another contact model
   parts.solid.set_histories(world.contacts.flips(), world.contacts.vectors());
   EXPECT_THROW(parts.snapshot.take_up(), InputError);
@@ -360,6 +399,66 @@ TEST(Snapshot, numbers_that_are_not_those_that_were_written_are_refused) {
       state[k] = wrong;
       EXPECT_THROW(read(state), InputError) << k << " " << wrong;
     }
+}
+
+/// What reading the file ends with, by any number of ranks; empty if it is read.
+std::string refusal(const File& file, int ranks) {
+  std::string line;
+  std::mutex mutex;
+  run_on_ranks(ranks_along_x(ranks), [&](SmallWorld& w) {
+    WorldParts parts(w, sleeping_settings(), 2 * r);
+    try {
+      file.read(w, parts);
+    } catch (const InputError& e) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      EXPECT_TRUE(line.empty() || line == e.what()) << "not alike on all ranks: " << line << "; " << e.what();
+      line = e.what();
+    }
+  });
+  return line;
+}
+
+TEST(Snapshot, a_section_that_is_cut_damaged_or_of_another_file_is_refused_by_all_ranks) {
+  File file, other;
+  for (File* f : {&file, &other})
+    run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
+      Block block(w, f == &file ? -0.03 : -0.029);
+      f->write(w, block.parts);
+    });
+  const std::string whole = bytes_of(file.end);
+  const auto with = [&](const std::string& bytes, int ranks) {
+    std::ofstream(file.end, std::ios::binary | std::ios::trunc) << bytes;
+    return refusal(file, ranks);
+  };
+  const auto says = [](const std::string& line, const char* what) {
+    return line.find(what) != std::string::npos && line.find('\n') == std::string::npos;
+  };
+  for (const int ranks : {1, 2, 3}) {
+    EXPECT_EQ(with(whole, ranks), "");
+    EXPECT_TRUE(says(with(bytes_of(other.end), ranks), "holds the granules of another restart file"));
+    for (const std::size_t size : {std::size_t{0}, std::size_t{7}, whole.size() / 2, whole.size() - 1})
+      EXPECT_TRUE(says(with(whole.substr(0, size), ranks), "ends before the granules of this fix do")) << size;
+    EXPECT_TRUE(says(with(whole + "x", ranks), "ends before the granules of this fix do"));
+    std::string begun = whole;  // a part is missing in the middle
+    begun.erase(whole.size() / 2, 64);
+    EXPECT_TRUE(says(with(begun, ranks), "is damaged"));
+    std::remove(file.end.c_str());
+    EXPECT_TRUE(says(refusal(file, ranks), "cannot be opened again"));
+  }
+  // any bit, wherever it is
+  for (std::size_t at = 0; at < whole.size(); at += 1 + at % 37) {
+    std::string broken = whole;
+    broken[at] = static_cast<char>(broken[at] ^ (1 << at % 8));
+    EXPECT_NE(with(broken, 2), "") << at;
+  }
+}
+
+TEST(Snapshot, a_file_that_cannot_be_written_is_named) {
+  run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
+    Block block(w, -0.03);
+    block.parts.snapshot.write();
+    EXPECT_THROW(block.parts.snapshot.append_to("/nowhere/at/all"), InputError);
+  });
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
 #!/usr/bin/python3
 """One impact on ever larger beds: what a granule that rests costs, culled, unculled, and frozen by hand.
 
-    validation/scale/scale.py [--sizes 20k,160k,1.28M] [--only unculled,culled,control] [--runs n] [--idle] [--few-steps]
+    validation/scale/scale.py [--sizes 20k,160k,1.28M,10.24M] [--only unculled,culled,asleep,control] [--runs n] [--idle]
+                              [--few-steps]
 
 Makes the beds that are missing (out/bed-SIZE.restart), then runs each size unculled (impact.in without its fix line), culled
-(impact.in) and by hand (control.in), in turns, each on one core, and prints run times, parts, memory and errors. Every run is
-kept in out/runs/; a run that is there, made of the same decks, bed and (culled) launcher, is not repeated, so that an
+(impact.in) and by hand (control.in), in turns, each on one core, and prints run times, parts, memory and errors. `asleep` runs
+(asleep.in) start from culled restart files (out/asleep-SIZE.restart); 10.24M has these alone: its file is laid by lay_culled.py.
+Every run is kept in out/runs/; a run that is there, made of the same decks, bed and (culled) launcher, is not repeated, so that an
 interrupted series goes on where it stopped. All figures: out/scale.json, table out/scale.txt, plot out/scale.png.
 `--idle`: no ball, nothing moves. `--few-steps`: tiny beds, a few steps, always run anew; what can be checked then is. `--table`: runs nothing, prints what is there.
 Exit: 0 all runs there and no granule lost, 1 else, 2 a run failed.
@@ -25,6 +27,8 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
+import culled_files  # noqa: E402
+import lay_culled  # noqa: E402
 import tiles  # noqa: E402
 from solidcull_runs import beds, decks, engine, errors, examples, logs, metrics, plots, tables  # noqa: E402
 from solidcull_runs.dumps import element_normal_loads, read_final  # noqa: E402
@@ -41,15 +45,21 @@ PERIOD, GRANULES, TOP = 0.075, 20000, 0.12       # m, of the tile; m: height of 
 MARGIN = tiles.GRANULE         # m: the sides stand as far outside of the tiles: no granule overlaps them
 ELEMENT = 0.0375               # m: edge of the floor's triangles
 SAMPLE = 0.5                   # s between two looks at the memory
-KINDS = ("unculled", "culled", "control")
+KINDS = ("unculled", "culled", "asleep", "control")
+CULLED = ("culled", "asleep")
 SLEEP = "exterior sleep"       # the keywords of the fix, if no others are given
 
 # name: tiles in x and y, the bed that it is laid of (none: of the tile itself), steps damped, then how often at most stopped and left free for how long
 BEDS = {"20k": ((1, 1), None, 12000, 10, 1000), "base": ((3, 3), None, 5000, 4, 300),
         "rested": ((3, 3), "base", 6000, 6, 500), "160k": ((4, 2), "rested", 2500, 10, 250), "1.28M": ((8, 8), "rested", 1000, 5, 250)}
-FEW_BEDS = {"tiny": ((1, 1), None, 500, 2, 50), "few-base": ((3, 3), None, 150, 2, 20), "small": ((4, 2), "few-base", 50, 2, 20)}
-FEW = {"PERIOD": 0.015, "GRANULES": 700, "BEDS": FEW_BEDS, "OUT": OUT / "few"}
+# name: tiles in x and y, the bed whose culled restart file it is laid of; it never was atoms, so there are no other runs of it
+LAID = {"10.24M": ((32, 16), "1.28M")}
+DOZE = 8000                    # steps in which a bed is put to sleep
+FEW_BEDS = {"tiny": ((1, 1), None, 500, 2, 50), "few-base": ((3, 3), None, 150, 2, 20), "small": ((4, 2), "few-base", 50, 2, 20),
+            "few-rested": ((3, 3), None, 3500, 4, 200)}
+FEW = {"PERIOD": 0.015, "GRANULES": 700, "BEDS": FEW_BEDS, "LAID": {"laid": ((6, 4), "few-rested")}, "DOZE": 7000, "OUT": OUT / "few"}
 FEW_TILE = {"poursteps": 3000, "dampsteps": 1500, "freesteps": 100}
+FEW_RESTED_TILE = {"poursteps": 4000, "dampsteps": 8000, "freesteps": 1000}  # for a bed that is to sleep as a whole
 HELPERS = ("base", "rested")      # beds that others are laid of, not sizes
 few_steps = False
 
@@ -65,11 +75,13 @@ def sides_of(copies):
     return [round(n * PERIOD + 2 * MARGIN, 9) for n in copies]
 
 
-def tile():
-    """The settled tile, periodic in x and y."""
-    variables = {"P": PERIOD, "granules": GRANULES, **(FEW_TILE if few_steps else {})}
-    return beds.made(OUT / "tile.restart", json.dumps(variables) + text_of("tile.in", "material.in"),
-                lambda part: engine.run_liggghts(HERE / "tile.in", HERE, OUT / "tile.log", {**variables, "restart": part}))
+def tile(of):
+    """The settled tile of a bed, periodic in x and y."""
+    rested = few_steps and of.endswith("rested")
+    variables = {"P": PERIOD, "granules": GRANULES, **(FEW_RESTED_TILE if rested else FEW_TILE if few_steps else {})}
+    name = "tile-rested" if rested else "tile"
+    return beds.made(OUT / f"{name}.restart", json.dumps(variables) + text_of("tile.in", "material.in"),
+                lambda part: engine.run_liggghts(HERE / "tile.in", HERE, OUT / f"{name}.log", {**variables, "restart": part}))
 
 
 def write_floor(file, sides):
@@ -84,7 +96,7 @@ def bed(name):
     """The bed at rest: files restart, floor, granules (.npy), and its recipe's hash."""
     copies, source, damp, stills, free = BEDS[name]
     sides, floor, granules = sides_of(copies), OUT / f"floor-{name}.stl", OUT / f"bed-{name}.npy"
-    source_file = bed(source)["restart"] if source else tile()
+    source_file = bed(source)["restart"] if source else tile(name)
     variables = {"L": sides[0], "W": sides[1], "dampsteps": damp, "stills": stills, "freesteps": free}
     recipe = json.dumps([variables, copies, ELEMENT, TOP]) + text_of("relax.in", "material.in", "bed.in") + (HERE / "tiles.py").read_text() \
         + beds.recipe_of(source_file)
@@ -114,6 +126,45 @@ def first_touch(granules, x, y):
     d2 = (granules["x"] - x)**2 + (granules["y"] - y)**2
     below = d2 < (BALL + granules["radius"])**2
     return float((granules["z"][below] + np.sqrt((BALL + granules["radius"][below])**2 - d2[below])).max())
+
+
+def drop_of(made_bed):
+    """Where the ball starts, and the height of the highest granule (m), as a deck's variables."""
+    before = np.load(made_bed["granules"])
+    touch = first_touch(before, made_bed["sides"][0] / 2, made_bed["sides"][1] / 2)
+    return {"z": f"{touch + FALL:.12g}", "top": f"{before['z'].max():.12g}"}
+
+
+def asleep_bed(name):
+    """The culled restart file of a bed: a bed put to sleep under a ball, or laid of one."""
+    file = OUT / f"asleep-{name}.restart"
+    if name in LAID:
+        copies, of = LAID[name]
+        source, made_of = asleep_bed(of), BEDS[of][0]
+        floor, sides = OUT / f"floor-{name}.stl", sides_of(copies)
+        recipe = "\n".join([json.dumps([copies, made_of, ELEMENT, TOP]), (HERE / "lay_culled.py").read_text(),
+                            (HERE / "culled_files.py").read_text(), beds.recipe_of(source["restart"])])
+
+        def make(part):
+            write_floor(floor, sides)
+            began = time.monotonic()
+            laid = lay_culled.lay(lay_culled.Source(source["restart"], made_of, PERIOD, MARGIN, lay_culled.Floor(source["floor"])), part, copies,
+                                  lay_culled.Floor(floor), TOP)
+            print(f"  {name}: {laid:,} granules laid in {time.monotonic() - began:.0f} s", flush=True)
+        made = {**source, "floor": floor, "sides": sides, "granules": None}
+    else:
+        made = bed(name)
+        copies, made = BEDS[name][0], {**made, **drop_of(made)}
+        variables = {"granules": GRANULES * copies[0] * copies[1], "L": made["sides"][0], "W": made["sides"][1], "z": made["z"],
+                     "top": made["top"], "culling": SLEEP, "steps": DOZE}
+        recipe = "\n".join([json.dumps(variables), text_of("doze.in", "scene.in", "ball.in", "material.in", "bed.in"), made["hash"],
+                            engine.hash_of_fix(engine.find_launcher())])
+
+        def make(part):
+            engine.run_liggghts(HERE / "doze.in", HERE, OUT / f"asleep-{name}.log",
+                                {**variables, "restart": made["restart"], "floormesh": made["floor"], "culled": part})
+    beds.made(file, recipe, make)
+    return {**made, "restart": file, "hash": hashlib.sha1(recipe.encode()).hexdigest()}
 
 
 # --- runs -----------------------------------------------------------------------------------------------------------
@@ -153,7 +204,9 @@ def deck_of(scene, kind):
     """The lines of one run's deck; what hangs on the fix is left out of an unculled one."""
     if kind == "control":
         return decks.read_deck(HERE / "control.in") + [f'print "{logs.TO_HERE}"'] + decks.end_of_deck("${final}")
-    lines = decks.make_deck(decks.read_deck(HERE / f"{scene}.in"), "cull", kind == "culled", None, "${base}")
+    if kind == "asleep":
+        scene = "asleep"
+    lines = decks.make_deck(decks.read_deck(HERE / f"{scene}.in"), "cull", kind in CULLED, None, "${base}")
     lines = [line for line in lines if "twin_counts" not in line]
     return [line.replace("${base}.final", "${final}") for line in lines]
 
@@ -181,19 +234,24 @@ def figures_of(scene, kind, text, made_bed, final, loads):
     """What is compared, and what a culled run says of itself."""
     main = max((t for t in logs.parse_log(text) if t.loop_time is not None), key=lambda t: len(t.rows))
     columns = {c: np.array([row[k] for row in main.rows]) for k, c in enumerate(main.columns)}
-    granules, before = read_final(final), np.load(made_bed["granules"])
-    moved = granules[granules["id"] <= len(before)]
     floor = columns["floor"][1:]  # the row before the first step counts the mesh's load twice
-    figures = {"loop_time": main.loop_time, "steps": int(columns["Step"][-1] - columns["Step"][0]), "granules": len(granules),
-               "mass": float(granules["mass"].sum()), "ids": hashlib.sha1(granules["id"].astype(np.int64).tobytes()).hexdigest()}
+    figures = {"loop_time": main.loop_time, "steps": int(columns["Step"][-1] - columns["Step"][0])}
+    if final:
+        granules, before = read_final(final), np.load(made_bed["granules"])
+        moved = granules[granules["id"] <= len(before)]
+        figures.update(granules=len(granules), mass=float(granules["mass"].sum()),
+                       ids=hashlib.sha1(granules["id"].astype(np.int64).tobytes()).hexdigest())
+    else:
+        figures["granules"] = int(columns["Atoms"][-1] + columns["cull[3]"][-1])
     if scene == "impact":
-        lost, gained = crater(before, granules, made_bed["sides"])
         figures["metrics"] = {
             "depth, end (m)": columns["depth"][-1], "depth, largest (m)": columns["depth"].max(),
             "force on ball, largest (N)": columns["force"].max(), "floor load, largest rise (N)": floor.max() - floor[0],
-            "floor load, end (N)": floor[-1], "kinetic energy, largest (J)": columns["bedke"].max(),
-            "crater volume (m3)": lost, "heap volume (m3)": gained}
-        figures["crater_near"] = crater(before, granules, made_bed["sides"], NEAR)[0]
+            "floor load, end (N)": floor[-1], "kinetic energy, largest (J)": columns["bedke"].max()}
+        if final:
+            lost, gained = crater(before, granules, made_bed["sides"])
+            figures["metrics"].update({"crater volume (m3)": lost, "heap volume (m3)": gained})
+            figures["crater_near"] = crater(before, granules, made_bed["sides"], NEAR)[0]
         if loads.exists():
             figures["element_loads"] = [round(float(x), 7) for x in element_normal_loads(loads)]
     else:
@@ -201,7 +259,7 @@ def figures_of(scene, kind, text, made_bed, final, loads):
         figures["metrics"] = {"kinetic energy, largest (J)": columns["bedke"].max(), "floor load, end (N)": floor[-1],
                               "largest displacement (m)": drift.max()}
     figures["metrics"] = {name: float(value) for name, value in figures["metrics"].items()}
-    if kind == "culled":
+    if kind in CULLED:
         figures.update({name: float(columns[f"cull[{k}]"].mean()) for k, name in enumerate(("exterior", "interface", "interior", "bodies"), 1)})
         figures["exterior_rows"] = [columns["Step"].astype(int).tolist(), columns["cull[1]"].astype(int).tolist()]
         figures["said"] = re.findall(r"^fix cull solid/cull: (.*)$", text, re.M)[-2:]
@@ -225,9 +283,9 @@ def check_few(run, text, granules, steps):
         wrong = f"ended with {run['granules']} granules, not {granules}"
     elif broken:
         wrong = f"has no number for {', '.join(broken)}"
-    elif run["kind"] == "culled" and run["wholes"] != [[granules, granules]] * 2:
+    elif run["kind"] in CULLED and run["wholes"] != [[granules, granules]] * 2:
         wrong = f"held {run['wholes']} granules on the way, not {granules}"
-    elif run["kind"] == "culled" and run["variables"]["culling"] == SLEEP and not run["interior"] > 0:
+    elif run["kind"] in CULLED and run["variables"]["culling"] == SLEEP and not run["interior"] > 0:
         wrong = "locked no granule"  # with a cover of its own the tiny bed may well lock none
     else:
         return
@@ -236,27 +294,28 @@ def check_few(run, text, granules, steps):
 
 def one_run(scene, size, kind, k, settings, of=""):
     """The figures of a run: kept ones, when they are of the same decks, bed and launcher; else it runs. of: goes into its name."""
-    made_bed = bed(size)
+    made_bed = asleep_bed(size) if kind == "asleep" else bed(size)
     place = OUT / "runs"
     place.mkdir(exist_ok=True)
     name = "-".join([scene, size, kind, *([of] if of else []), str(k + 1)])
     kept, deck, final = place / f"{name}.json", place / f"{name}.in", place / f"{name}.final"
     elements = place / f"{name}-floor-*.vtk"
-    copies = BEDS[size][0]
+    copies = (BEDS.get(size) or LAID[size])[0]
     variables = {"granules": GRANULES * copies[0] * copies[1], "L": made_bed["sides"][0], "W": made_bed["sides"][1],
                  **({"steps": settings.steps} if settings.steps else {})}
     if scene == "impact":
-        before = np.load(made_bed["granules"])
-        touch = first_touch(before, made_bed["sides"][0] / 2, made_bed["sides"][1] / 2)
         steps = settings.steps or 8000
-        variables.update(dx=SHIFTS[k], z=f"{touch + FALL:.12g}", top=f"{before['z'].max():.12g}", every=steps // 2)
+        drop = {key: made_bed[key] for key in ("z", "top")} if kind == "asleep" else drop_of(made_bed)
+        variables.update(dx=SHIFTS[k], **drop, every=steps // 2)
     if kind == "control":
         variables["reach"] = settings.reach
-    if kind == "culled":
+    if kind in CULLED:
         variables["culling"] = settings.culling
     lines = deck_of(scene, kind)
+    if size in LAID:  # a bed of this size is not to be atoms at the end
+        lines = [line for line in lines if "${final}" not in line and not line.startswith("unfix cull")]
     recipe = hashlib.sha1(json.dumps([decks.without_comments(lines), text_of("scene.in", "ball.in", "material.in", "bed.in"), variables, made_bed["hash"],
-                                      engine.hash_of_fix(engine.find_launcher()) if kind == "culled" else ""]).encode()).hexdigest()
+                                      engine.hash_of_fix(engine.find_launcher()) if kind in CULLED else ""]).encode()).hexdigest()
     old = json.loads(kept.read_text()) if kept.exists() else None
     if old and (settings.table or (old["recipe"] == recipe and not few_steps)):
         return {**old, "stale": old["recipe"] != recipe}
@@ -265,17 +324,23 @@ def one_run(scene, size, kind, k, settings, of=""):
     deck.write_text("\n".join(lines).replace("${final}", str(final)) + "\n")  # no variable is put into quotes
     for file in [final, *place.glob(elements.name)]:
         file.unlink(missing_ok=True)
+    restart = made_bed["restart"]
+    if kind == "asleep" and k:
+        restart = place / f"{name}.restart"
+        culled_files.with_ball_moved(made_bed["restart"], restart, SHIFTS[k])
     text, watched = run_engine(deck, place / f"{name}.log", {
-        **variables, "restart": made_bed["restart"], "floormesh": made_bed["floor"], "final": final, "elements": elements})
+        **variables, "restart": restart, "floormesh": made_bed["floor"], "final": final, "elements": elements})
     steps = sorted(place.glob(elements.name), key=lambda f: int(f.stem.rsplit("-", 1)[1]))
     run = {"name": name, "scene": scene, "size": size, "kind": kind, "date": time.strftime("%Y-%m-%d %H:%M"), "recipe": recipe,
-           "variables": variables, **watched, **figures_of(scene, kind, text, made_bed, final, steps[-1] if steps else place / "none")}
+           "variables": variables, **watched, **figures_of(scene, kind, text, made_bed, None if size in LAID else final, steps[-1] if steps else place / "none")}
     if few_steps:
         check_few(run, text, variables["granules"] + (scene == "impact"), settings.steps)
-    final.unlink()
+    final.unlink(missing_ok=True)
+    if restart != made_bed["restart"]:
+        restart.unlink()
     kept.with_suffix(".part").write_text(json.dumps(run) + "\n")
     kept.with_suffix(".part").rename(kept)
-    print(f"  {name}: {run['loop_time']:.1f} s, peak {run['peak_mb']:.0f} MB", flush=True)
+    print(f"  {name}: {run['loop_time']:.1f} s, with what is before {run['wall']:.1f} s, peak {run['peak_mb']:.0f} MB", flush=True)
     return {**run, "stale": False}
 
 
@@ -296,7 +361,8 @@ def summary(runs):
     first = runs[0]
     result = {"runs": [r["name"] for r in runs], "loop_times": [r["loop_time"] for r in runs], "own_times": list(map(own_time, runs)),
               "loop_time": statistics.median(r["loop_time"] for r in runs), "own_time": statistics.median(map(own_time, runs)),
-              "steps": first["steps"], "granules": first["granules"],
+              "steps": first["steps"], "granules": first["granules"], "wall": statistics.median(r["wall"] for r in runs),
+              "cpu": statistics.median(r["cpu"] for r in runs),
               "peak_mb": max(r["peak_mb"] for r in runs), "steady_mb": statistics.median(map(steady_mb, runs))}
     result["granule_steps_per_s"] = first["granules"] * first["steps"] / result["loop_time"]
     if "exterior" in first:
@@ -311,7 +377,7 @@ def compared(runs, kind):
     """Speed-up and errors of one kind against the unculled runs."""
     unculled, own = runs["unculled"], runs[kind]
     result = {"speed_up": statistics.median(map(own_time, unculled)) / max(1e-9, statistics.median(map(own_time, own)))}
-    if kind == "culled":
+    if kind in CULLED:
         result["over_exterior"] = unculled[0]["granules"] / statistics.fmean(r["exterior"] for r in own)
         result["efficiency"] = result["speed_up"] / result["over_exterior"]
     result["lost"] = max((unculled[0]["granules"] - r["granules"] for r in own), key=abs)
@@ -348,9 +414,10 @@ def table(report):
                 lines.append(f"  crater within {1000 * NEAR:g} mm (m3): {c['crater_near'][0]:.6g} unculled, {c['crater_near'][1]:.6g} {kind}")
             if "element_loads" in c:
                 lines.append("  load on an element of the floor: " + ", ".join(f"{k} {v:.4g}" for k, v in c["element_loads"].items()))
-        culled = of_size["kinds"].get("culled")
-        if culled:
-            lines += [f"  {line}" for line in culled["said"]]
+        for kind in CULLED:
+            if s := of_size["kinds"].get(kind):
+                lines += [f"  {kind}: whole run {s['wall']:.1f} s, {s['cpu']:.1f} s of a core, peak {s['peak_mb'] / 1024:.2f} GiB"]
+                lines += [f"  {kind}: {line}" for line in s["said"]]
         for kind in of_size["kinds"]:
             lines += [f"  {note}" for note in of_size["notes"][kind]]
     return "\n".join(lines)
@@ -365,7 +432,7 @@ def note(run):
 
 def plot(report, file):
     fig, ax = plots.plt.subplots(figsize=(6, 4.5))
-    for kind, style in (("unculled", "o-"), ("culled", "s-"), ("control", "^--")):
+    for kind, style in (("unculled", "o-"), ("culled", "s-"), ("asleep", "d-"), ("control", "^--")):
         points = [(s["granules"], s["loop_time"]) for r in report.values() for k, s in r["kinds"].items() if k == kind]
         if points:
             ax.loglog(*zip(*points), style, label="frozen by hand" if kind == "control" else kind)
@@ -378,8 +445,8 @@ def plot(report, file):
 def main(argv=None):
     global few_steps
     p = argparse.ArgumentParser(prog="scale.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    p.add_argument("--sizes", help="default: all that BEDS has: 20k,160k,1.28M")
-    p.add_argument("--only", default="", help="unculled, culled or control, or several; default all (--idle: no control)")
+    p.add_argument("--sizes", help="default: 20k,160k,1.28M; also: 10.24M, asleep alone")
+    p.add_argument("--only", default="", help="unculled, culled, asleep or control, or several; default all but asleep (--idle: no control)")
     p.add_argument("--runs", type=int, default=1, help=f"of each kind, 1 to {len(SHIFTS)}; three unculled give the noise floor")
     p.add_argument("--culling", default=SLEEP, help="the keywords of the fix")
     p.add_argument("--reach", type=float, default=0.04, help="m: what the control lets move around the impact")
@@ -393,31 +460,35 @@ def main(argv=None):
     if few_steps:
         globals().update(FEW)
         settings.steps = settings.steps or 120  # the ball touches after some 50
-    sizes = settings.sizes.split(",") if settings.sizes else [b for b in BEDS if not b.endswith(HELPERS)]
-    kinds = [k for k in KINDS if k in (settings.only or ",".join(KINDS)).split(",") and not (settings.idle and k == "control")]
-    if unknown := [s for s in sizes if s not in BEDS] or [k for k in settings.only.split(",") if k and k not in KINDS]:
-        p.error(f"unknown: {', '.join(unknown)}; sizes are {', '.join(BEDS)}, kinds {', '.join(KINDS)}")
+    sizes = settings.sizes.split(",") if settings.sizes else [b for b in BEDS if not b.endswith(HELPERS)] + (list(LAID) if few_steps else [])
+    asked = settings.only or ",".join(KINDS if few_steps else [k for k in KINDS if k != "asleep"])
+    kinds = [k for k in KINDS if k in asked.split(",") and not (settings.idle and k in ("asleep", "control"))]
+    if unknown := [s for s in sizes if s not in BEDS and s not in LAID] or [k for k in settings.only.split(",") if k and k not in KINDS]:
+        p.error(f"unknown: {', '.join(unknown)}; sizes are {', '.join([*BEDS, *LAID])}, kinds {', '.join(KINDS)}")
+    if settings.idle:
+        sizes = [s for s in sizes if s not in LAID]
     if not 1 <= settings.runs <= len(SHIFTS):
         p.error(f"--runs is 1 to {len(SHIFTS)}")
     OUT.mkdir(parents=True, exist_ok=True)
     scene = "idle" if settings.idle else "impact"
     report = {}
     for size in sizes:
-        if settings.table and not (OUT / f"bed-{size}.restart").exists():
+        own_kinds = ["asleep"] if size in LAID else kinds
+        if settings.table and not (OUT / f"{'asleep' if size in LAID else 'bed'}-{size}.restart").exists():
             continue
-        bed(size)
+        asleep_bed(size) if "asleep" in own_kinds else bed(size)
         if settings.beds:
             continue
         print(f"=== {size}, {scene}", flush=True)
         # unculled runs that are there are compared with, whatever this call runs
         runs = {kind: [] for kind in KINDS}
         for k in range(settings.runs):
-            for kind in kinds:
+            for kind in own_kinds:
                 run = one_run(scene, size, kind, k, settings)
                 runs[kind] += [run] if run else []
-        for kind in set(KINDS) - set(kinds):
+        for kind in set(KINDS) - set(own_kinds) if size not in LAID else ():
             keep = argparse.Namespace(**{**vars(settings), "table": True})
-            runs[kind] = [r for k in range(len(SHIFTS)) if not (scene == "idle" and kind == "control") if (r := one_run(scene, size, kind, k, keep))]
+            runs[kind] = [r for k in range(len(SHIFTS)) if not (scene == "idle" and kind in ("asleep", "control")) if (r := one_run(scene, size, kind, k, keep))]
         there = [kind for kind in KINDS if runs[kind]]
         report[size] = {"kinds": {kind: summary(runs[kind]) for kind in there},
                         "against": {kind: compared(runs, kind) for kind in there if kind != "unculled" and runs["unculled"]},
@@ -430,7 +501,8 @@ def main(argv=None):
     (OUT / f"{name}.txt").write_text(text + "\n")
     plot(report, OUT / f"{name}.png")
     print("\n" + text)
-    lost = any(c["lost"] or not c["ids_good"] for r in report.values() for c in r["against"].values())
+    lost = any(c["lost"] or not c["ids_good"] for r in report.values() for c in r["against"].values()) or \
+        any(r["kinds"]["asleep"]["granules"] != LAID[size][0][0] * LAID[size][0][1] * GRANULES + 1 for size, r in report.items() if size in LAID)
     return 1 if lost else 0
 
 

@@ -1,0 +1,367 @@
+#include "section_chunks.h"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+
+#include "store_exchange.h"
+
+namespace solidcull {
+namespace {
+
+constexpr int granules_per_chunk = 4096;
+
+std::uint64_t bits(double x) {
+  std::uint64_t word;
+  std::memcpy(&word, &x, sizeof word);
+  return word;
+}
+double number(std::uint64_t word) {
+  double x;
+  std::memcpy(&x, &word, sizeof x);
+  return x;
+}
+std::uint64_t whole(std::int64_t x) { return static_cast<std::uint64_t>(x); }
+
+// columns of the tables
+enum PartColumn { own_lo = 0, own_hi = 3, observer = 6, observed_then = 13, part_columns = 20 };
+enum InterfaceColumn { i_tag, i_body, i_place, i_radius = i_place + 3, i_mass, i_held, interface_columns };
+enum ContactColumn { c_low, c_high, c_body, c_known, c_history };
+enum InteriorColumn {
+  g_tag,
+  g_body,
+  g_place,
+  g_radius = g_place + 3,
+  g_mass,
+  g_type,
+  g_layout,
+  g_step,
+  g_normal,
+  g_change,
+  g_walls = g_change + 3,
+  g_held,
+  g_record
+};
+
+void put(std::uint64_t* to, const Vec3& v) {
+  for (int d = 0; d < 3; ++d) to[d] = bits(v[d]);
+}
+Vec3 vector_of(const std::uint64_t* from) { return {number(from[0]), number(from[1]), number(from[2])}; }
+void put(std::uint64_t* to, const Pose& p) {
+  put(to, p.origin());
+  for (int k = 0; k < 4; ++k) to[3 + k] = bits(p.quaternion().coeffs()[k]);
+}
+Pose pose_of(const std::uint64_t* from) {
+  return Pose(vector_of(from), Eigen::Quaterniond(number(from[6]), number(from[3]), number(from[4]), number(from[5])));
+}
+
+/// Mixes a word into a sum that does not depend on the order in which granules come.
+std::uint64_t mixed(std::uint64_t sum, std::uint64_t word) {
+  sum = (sum ^ word) * 0x9e3779b97f4a7c15u;
+  return sum ^ (sum >> 32);
+}
+std::uint64_t mixed(std::uint64_t tag, int body, const Vec3& place) {
+  std::uint64_t sum = mixed(mixed(1, tag), whole(body));
+  for (int d = 0; d < 3; ++d) sum = mixed(sum, bits(place[d]));
+  return sum;
+}
+
+/// The table's words as the numbers whose bits they are.
+void numbers_of(const WordTable& table, std::vector<double>& numbers) {
+  static_assert(sizeof(double) == sizeof(std::uint64_t), "a number is a word");
+  numbers.resize(table.words.size());
+  if (!numbers.empty()) std::memcpy(numbers.data(), table.words.data(), numbers.size() * sizeof(double));
+}
+
+std::size_t index_below(std::uint64_t x, std::size_t n) {
+  if (x >= n) throw InternalError("a chunk of a restart file names something that is not there");
+  return static_cast<std::size_t>(x);
+}
+
+}  // namespace
+
+// ------------------------------------------------------------------------------------------------------------ out
+
+ChunkSource::ChunkSource(const Ports& ports, const Solid& solid, const Shell& shell, const AtomIndex& index, const Cover& cover)
+    : ports_(ports), solid_(solid), shell_(shell), index_(index), cover_(cover), history_(solid.contacts().width()) {
+  for (const auto& body : solid_.bodies().bodies()) bodies_.push_back(body.first);
+  contacts_.clear(0);
+}
+
+std::uint64_t ChunkSource::identity(const Ports& ports, const Solid& solid, const Shell& shell) {
+  std::uint64_t sum = mixed(whole(ports.run.step), whole(ports.ranks.count));
+  solid.store().for_each([&](const Resident& g) { sum += mixed(whole(g.tag), g.body, g.position); });
+  for (int i = 0; i < ports.atoms.owned; ++i)
+    if (shell[i].locked) sum += mixed(whole(ports.atoms.tag[i]), shell[i].body, shell[i].place);
+  std::uint64_t all = 0;
+  for (const std::uint64_t one : ports.ranks.gather(std::vector<std::uint64_t>{sum})) all = mixed(all, one);
+  return all;
+}
+
+bool ChunkSource::next(SectionChunk& chunk) {
+  chunk.rank = static_cast<std::uint64_t>(ports_.ranks.me);
+  chunk.granules = 0;
+  chunk.bytes.clear();
+  if (!part_given_) {
+    part(chunk);
+    part_given_ = true;
+    return true;
+  }
+  if (atom_ < ports_.atoms.owned) interface_block(chunk);
+  if (!chunk.bytes.empty()) return true;
+  if (slot_ < solid_.store().slots()) interior_block(chunk);
+  if (!chunk.bytes.empty()) return true;
+  if (graph_contacts_ != solid_.contacts().size())
+    throw InternalError(std::to_string(solid_.contacts().size()) + " contacts are frozen and " + std::to_string(graph_contacts_) +
+                        " were written");
+  return false;
+}
+
+void ChunkSource::part(SectionChunk& chunk) {
+  chunk.kind = SectionChunk::part;
+  WordTable table;
+  table.clear(part_columns);
+  std::uint64_t* const row = table.add_row();
+  put(row + own_lo, ports_.run.own.lo);
+  put(row + own_hi, ports_.run.own.hi);
+  put(row + observer, cover_.observer());
+  put(row + observed_then, cover_.observed_then());
+  pack_columns(table, chunk.bytes);
+  table.clear(1);
+  for (int l = 0; l < ports_.atoms.layouts(); ++l)
+    for (const char c : ports_.atoms.layout_text(l) + "\n") *table.add_row() = static_cast<unsigned char>(c);
+  pack_columns(table, chunk.bytes);
+  std::vector<double> numbers;
+  table.clear(0);
+  for (const auto& body : solid_.bodies().bodies()) {
+    SolidBody b = body.second;
+    numbers.clear();
+    b.each_number([&](auto& x) { numbers.push_back(static_cast<double>(x)); });
+    if (table.rows == 0) table.clear(numbers.size());
+    std::transform(numbers.begin(), numbers.end(), table.add_row(), bits);
+  }
+  pack_columns(table, chunk.bytes);
+}
+
+void ChunkSource::begin_block() {
+  contacts_before_ += contacts_.rows;
+  contacts_.clear(c_history + solid_.contacts().width());
+  granules_.clear(interface_columns);
+  by_length_.clear();
+}
+
+void ChunkSource::contact(std::int64_t low, std::int64_t high, const double* history) {
+  const SolidBodies& living = solid_.bodies();
+  const int body = living.body_of(low) ? living.body_of(low) : living.body_of(high);
+  const auto at = std::lower_bound(bodies_.begin(), bodies_.end(), body);
+  if (!body || at == bodies_.end() || *at != body)
+    throw InternalError("a frozen contact of granules " + std::to_string(low) + " and " + std::to_string(high) +
+                        " is of no body of this rank");
+  std::uint64_t* const row = contacts_.add_row();
+  row[c_low] = whole(low);
+  row[c_high] = whole(high);
+  row[c_body] = static_cast<std::uint64_t>(at - bodies_.begin());
+  row[c_known] = history != nullptr;
+  if (history) std::transform(history, history + history_.size(), row + c_history, bits);
+}
+
+/// With granules that came before, and with those that are not on this rank.
+void ChunkSource::contacts_of(std::int64_t tag) {
+  const GranuleStore& store = solid_.store();
+  const bool stored = store.contains(tag);
+  const auto comes_later = [&](std::int64_t partner) {
+    if (store.contains(partner)) return !stored || store.comes_before(tag, partner);
+    const int* i = stored ? nullptr : index_.find(partner);
+    return i && shell_[*i].locked && *i > index_.at(tag);
+  };
+  solid_.contacts().for_each(tag, [&](std::int64_t partner, const double* history) {
+    if (comes_later(partner)) return;
+    const std::int64_t low = std::min(tag, partner), high = std::max(tag, partner);
+    if (history) {
+      history_.assign(history, history + history_.size());
+      if (tag != low) solid_.contacts().change_side(history_.data());
+    }
+    bool known = history != nullptr;
+    if (solid_.contacts().contains(low, high))
+      ++graph_contacts_;
+    else
+      known = solid_.inner_history(*store.find(low), high, history_.data());
+    contact(low, high, known ? history_.data() : nullptr);
+  });
+}
+
+void ChunkSource::interface_block(SectionChunk& chunk) {
+  begin_block();
+  const Atoms& atoms = ports_.atoms;
+  for (; atom_ < atoms.owned && granules_.rows < granules_per_chunk; ++atom_) {
+    const Locked& e = shell_[atom_];
+    if (!e.locked) continue;
+    std::uint64_t* const row = granules_.add_row();
+    row[i_tag] = whole(atoms.tag[atom_]);
+    row[i_body] = static_cast<std::uint64_t>(std::lower_bound(bodies_.begin(), bodies_.end(), e.body) - bodies_.begin());
+    put(row + i_place, e.place);
+    row[i_radius] = bits(atoms.radius[atom_]);
+    row[i_mass] = bits(atoms.mass[atom_]);
+    row[i_held] = e.held;
+    contacts_of(atoms.tag[atom_]);
+  }
+  if (granules_.rows == 0) return;
+  chunk.kind = SectionChunk::interface_granules;
+  chunk.granules = granules_.rows;
+  interface_ += granules_.rows;
+  pack_columns(granules_, chunk.bytes);
+  pack_columns(contacts_, chunk.bytes);
+}
+
+void ChunkSource::interior_block(SectionChunk& chunk) {
+  begin_block();
+  const auto add = [&](const StoredGranule& g, const std::uint64_t* record, int length) {
+    WordTable& table = by_length_[length];
+    if (table.rows == 0) table.clear(static_cast<std::size_t>(g_record + length));
+    std::uint64_t* const row = table.add_row();
+    row[g_tag] = whole(g.tag);
+    row[g_body] = static_cast<std::uint64_t>(std::lower_bound(bodies_.begin(), bodies_.end(), g.body) - bodies_.begin());
+    put(row + g_place, g.position);
+    row[g_radius] = bits(g.radius);
+    row[g_mass] = bits(g.mass);
+    row[g_type] = whole(g.type);
+    row[g_layout] = whole(g.layout);
+    row[g_step] = whole(g.lock_step);
+    row[g_normal] = bits(g.normal_load);
+    put(row + g_change, g.load_change);
+    row[g_walls] = whole(g.walls);
+    row[g_held] = g.held;
+    std::copy(record, record + length, row + g_record);
+    contacts_of(g.tag);
+    ++chunk.granules;
+  };
+  slot_ = solid_.store().visit_some(slot_, granules_per_chunk, add);
+  if (chunk.granules == 0) return;
+  chunk.kind = SectionChunk::interior_granules;
+  interior_ += chunk.granules;
+  pack_columns(granules_, chunk.bytes);
+  pack_columns(contacts_, chunk.bytes);
+  const std::uint64_t tables = by_length_.size();
+  const auto* const bytes = reinterpret_cast<const char*>(&tables);
+  chunk.bytes.insert(chunk.bytes.end(), bytes, bytes + sizeof tables);
+  for (const auto& table : by_length_) pack_columns(table.second, chunk.bytes);
+}
+
+// ------------------------------------------------------------------------------------------------------------ in
+
+auto ChunkReader::part(const SectionChunk& chunk) -> const Head& {
+  const char *at = chunk.bytes.data(), *const end = at + chunk.bytes.size();
+  auto sender = std::make_shared<Sender>();
+  WordTable table;
+  at = unpack_columns(at, end, table);
+  if (table.rows != 1 || table.columns != part_columns) throw InternalError("a part of a restart file has no head");
+  head_.own = {vector_of(table.row(0) + own_lo), vector_of(table.row(0) + own_hi)};
+  sender->rank = static_cast<int>(chunk.rank);
+  sender->observer = pose_of(table.row(0) + observer);
+  sender->observed_then = pose_of(table.row(0) + observed_then);
+  at = unpack_columns(at, end, table);
+  layout_.clear();
+  std::string text;
+  for (std::size_t r = 0; r < table.rows; ++r) {
+    const char c = static_cast<char>(*table.row(r));
+    if (c != '\n') {
+      text += c;
+      continue;
+    }
+    layout_.push_back(ports_.atoms.layout_from_text(text));
+    text.clear();
+  }
+  unpack_columns(at, end, table);
+  sender->bodies.resize(table.rows);
+  for (std::size_t r = 0; r < table.rows; ++r) {
+    std::size_t c = 0;
+    sender->bodies[r].each_number([&](auto& x) {
+      x = static_cast<std::decay_t<decltype(x)>>(number(table.row(r)[index_below(c, table.columns)]));
+      ++c;
+    });
+  }
+  head_.sender = sender;
+  return head_;
+}
+
+const Parcel& ChunkReader::parcel(const SectionChunk& chunk) {
+  if (!head_.sender || static_cast<std::uint64_t>(head_.sender->rank) != chunk.rank)
+    throw InternalError("a chunk of a restart file stands before its part");
+  const char *at = chunk.bytes.data(), *const end = at + chunk.bytes.size();
+  parcel_.sender = head_.sender;
+  parcel_.granules.clear();
+  at = unpack_columns(at, end, interface_);
+  for (std::size_t r = 0; r < interface_.rows; ++r) {
+    const std::uint64_t* const row = interface_.row(r);
+    Parcel::Granule g;
+    g.tag = static_cast<std::int64_t>(row[i_tag]);
+    g.body = static_cast<int>(index_below(row[i_body], head_.sender->bodies.size()));
+    g.place = vector_of(row + i_place);
+    g.radius = number(row[i_radius]);
+    g.mass = number(row[i_mass]);
+    g.held = row[i_held] != 0;
+    parcel_.granules.push_back(g);
+  }
+  at = unpack_columns(at, end, contacts_);
+  read_contacts(contacts_);
+  if (chunk.kind == SectionChunk::interior_granules) {
+    std::uint64_t tables = 0;
+    if (static_cast<std::size_t>(end - at) < sizeof tables) throw InternalError("a chunk of a restart file ends too early");
+    std::memcpy(&tables, at, sizeof tables);
+    at += sizeof tables;
+    records_.resize(index_below(tables, chunk.bytes.size()));
+    for (std::vector<double>& numbers : records_) {
+      at = unpack_columns(at, end, interior_);
+      read_interior(interior_, numbers);
+    }
+  }
+  if (parcel_.granules.size() != chunk.granules) throw InternalError("a chunk of a restart file misses granules");
+  return parcel_;
+}
+
+void ChunkReader::read_contacts(const WordTable& table) {
+  parcel_.edges.clear();
+  parcel_.edges.reserve(table.rows);
+  if (table.rows && table.columns != c_history + width_) throw InternalError("a chunk of a restart file has other histories");
+  numbers_of(table, histories_);
+  for (std::size_t r = 0; r < table.rows; ++r) {
+    const std::uint64_t* const row = table.row(r);
+    parcel_.edges.push_back({static_cast<std::int64_t>(row[c_low]), static_cast<std::int64_t>(row[c_high]),
+                             static_cast<int>(index_below(row[c_body], head_.sender->bodies.size())),
+                             row[c_known] ? histories_.data() + r * table.columns + c_history : nullptr});
+  }
+}
+
+void ChunkReader::read_interior(const WordTable& table, std::vector<double>& numbers) {
+  if (table.columns < g_record) throw InternalError("a chunk of a restart file has no granules");
+  const int length = static_cast<int>(table.columns - g_record);
+  numbers_of(table, numbers);
+  for (std::size_t r = 0; r < table.rows; ++r) {
+    const std::uint64_t* const row = table.row(r);
+    Parcel::Granule g;
+    g.tag = static_cast<std::int64_t>(row[g_tag]);
+    g.body = static_cast<int>(index_below(row[g_body], head_.sender->bodies.size()));
+    g.place = vector_of(row + g_place);
+    g.radius = number(row[g_radius]);
+    g.mass = number(row[g_mass]);
+    g.held = row[g_held] != 0;
+    StoredGranule& s = g.stored;
+    s.tag = g.tag;
+    s.position = g.place;
+    s.radius = g.radius;
+    s.mass = g.mass;
+    s.type = static_cast<int>(row[g_type]);
+    s.layout = layout_[index_below(row[g_layout], layout_.size())];
+    s.lock_step = static_cast<std::int64_t>(row[g_step]);
+    if (scales_.image_by_place()) s.lock_step = std::min(s.lock_step, StoreExchange::locked_long_ago);
+    s.normal_load = number(row[g_normal]);
+    s.load_change = vector_of(row + g_change);
+    s.walls = static_cast<int>(row[g_walls]);
+    s.held = g.held;
+    g.record = numbers.data() + r * table.columns + g_record;
+    g.length = length;
+    parcel_.granules.push_back(g);
+  }
+}
+
+}  // namespace solidcull
