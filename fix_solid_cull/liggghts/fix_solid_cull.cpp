@@ -178,8 +178,10 @@ void FixSolidCull::pre_neighbor() {
 }
 
 void FixSolidCull::pre_force(int) {
-  walls_.begin_step();
-  hand_on([&] { culling_->leave_out_inner_pairs(); });
+  hand_on([&] {
+    walls_.begin_step(culling_->may_ask_for_wall_loads());
+    culling_->leave_out_inner_pairs();
+  });
 }
 
 void FixSolidCull::pre_final_integrate() {
