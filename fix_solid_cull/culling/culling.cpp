@@ -207,7 +207,8 @@ void Culling::take_forces() {
     if (!p_.solid.has_store()) return;
     p_.pacing.begin_within_run(step);
   }
-  take_loads();
+  if (p_.census.something_locked() || !loads_are_none_) take_loads();
+  loads_are_none_ = !p_.census.something_locked();
   collect_wakes();
   if (p_.pacing.due(step)) {
     look();

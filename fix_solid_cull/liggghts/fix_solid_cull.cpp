@@ -161,10 +161,12 @@ void FixSolidCull::setup(int) {
 // ------------------------------------------------------------------------------------------------------------ a time step
 
 void FixSolidCull::pre_initial_integrate() {
+  if (culling_->idles()) return;
   hand_on([&] { culling_->initial_step(); });
 }
 
 void FixSolidCull::post_integrate() {
+  if (culling_->idles()) return;
   hand_on([&] { culling_->integrate(); });
 }
 
@@ -189,6 +191,7 @@ void FixSolidCull::pre_final_integrate() {
 }
 
 void FixSolidCull::final_integrate() {
+  if (culling_->idles()) return;
   hand_on([&] { culling_->finish_step(); });
 }
 
