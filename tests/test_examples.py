@@ -206,6 +206,20 @@ class Validation(Scripts):
         self.assertEqual({c["lost"] for c in choices.values()}, {0})
         self.assertGreater(choices["sleep"]["over_exterior"], choices["live"]["over_exterior"])
 
+    def test_no_harm(self):
+        few = ROOT / "validation" / "no_harm" / "out" / "few"
+        for old in few.glob("*.json"):
+            old.unlink()
+        self.run_script(few.parents[1] / "no_harm.py")
+        for scene in ("drum", "mixer", "gas", "silo", "shake", "column", "switch"):
+            for mode in ("sleep", "live"):
+                with self.subTest(scene=scene, mode=mode):
+                    result = json.loads((few / f"{scene}-300-{mode}.json").read_text())
+                    self.assertEqual((result["granules"], result["fix"], len(result["pairs"])), (300, f"exterior {mode}", 1))
+                    without, with_it = result["pairs"][0]
+                    self.assertGreater(min(without["user"], with_it["user"], result["user"]), 0)
+                    self.assertGreaterEqual(with_it["culled"], with_it["restored"])
+
     def test_activity(self):
         few = ROOT / "validation" / "activity" / "out" / "few"
         # asleep, so that the small beds, a few granules high, are culled at all

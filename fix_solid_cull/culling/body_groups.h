@@ -33,6 +33,8 @@ class BodyGroups {
   std::size_t spanning_bodies() const { return spanning_.size(); }
   bool has_key_of_first_part(int body) const;  ///< so that each body over all ranks is counted once
 
+  void forget_ghosts() { ghost_key_.clear(); }  ///< nothing is culled on any rank
+
   // --- collective
   /// Which parts are one body: those that contacts across ranks tie together.
   void group();

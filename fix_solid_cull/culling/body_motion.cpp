@@ -25,6 +25,7 @@ void BodyMotion::refresh() {
   slot_.clear();
   place_.clear();
   riding_.clear();
+  if (solid_.bodies().bodies().empty()) return;
   const Atoms& atoms = ports_.atoms;
   FlatMap<int> slot;
   FlatMap<char> has_atoms;

@@ -150,7 +150,10 @@ void Culling::take_neighbours() {
   p_.motion.is_stale();
   lists_are_new();
   if (!p_.solid.has_store()) return;
-  take_arrivals();
+  if (p_.census.something_locked())
+    take_arrivals();
+  else
+    p_.groups.forget_ghosts();
   check_inserted();
   // the box followed the granules: stored ones go to the rank that has their place now, before anything comes near them
   if (p_.census.something_stored() && p_.ports.ranks.any(p_.ports.ranks.subdomain_changed()))
@@ -175,10 +178,17 @@ void Culling::settle_bodies() {
 void Culling::leave_out_inner_pairs() {
   if (!inner_pairs_listed_) return;
   inner_pairs_listed_ = false;
+  if (!p_.census.something_locked()) return;
   const auto timed = p_.report.time(Part::load);
   std::vector<int> body(static_cast<std::size_t>(p_.ports.atoms.owned + p_.ports.atoms.ghosts));
   for (std::size_t i = 0; i < body.size(); ++i) body[i] = p_.groups.key_of_atom(static_cast<int>(i));
   p_.ports.contacts.leave_out_pairs_within(body);
+}
+
+/// A granule that goes to the store takes its loads on walls along: before that it is locked, or was chosen by a look.
+bool Culling::may_ask_for_wall_loads() const {
+  if (phase_ != Phase::stepping) return true;
+  return p_.scales.sleeping() && (p_.census.something_locked() || proposal_.any_here() || p_.pacing.due(p_.ports.run.step));
 }
 
 void Culling::take_loads() {
@@ -197,7 +207,8 @@ void Culling::take_forces() {
     if (!p_.solid.has_store()) return;
     p_.pacing.begin_within_run(step);
   }
-  take_loads();
+  if (p_.census.something_locked() || !loads_are_none_) take_loads();
+  loads_are_none_ = !p_.census.something_locked();
   collect_wakes();
   if (p_.pacing.due(step)) {
     look();

@@ -31,8 +31,11 @@ class Culling {
   void take_neighbours();                               ///< after the engine's exchange, when ghosts are there
   void lists_are_new() { inner_pairs_listed_ = true; }  ///< local
   void leave_out_inner_pairs();                         ///< local
-  void take_forces();                                   ///< after all forces: loads, wake-ups, a look
-  void finish_step();                                   ///< bodies have their velocities. Local
+  /// In a step nothing is culled on any rank: initial_step(), integrate() and finish_step() would do nothing. Local.
+  bool idles() const { return phase_ == Phase::stepping && !p_.census.something_locked(); }
+  bool may_ask_for_wall_loads() const;  ///< of the forces that are computed next. Local
+  void take_forces();                   ///< after all forces: loads, wake-ups, a look
+  void finish_step();                   ///< bodies have their velocities. Local
   void write_outputs();
 
   void end_run();
@@ -113,6 +116,8 @@ class Culling {
   bool told_of_file_ = false;        // that restart files of this run hold more than atoms
   bool bodies_are_fast_ = false;     // some body may come too far between two times when ranks talk
   std::int64_t restored_then_ = 0;   // granules restored on this rank until culling was judged last
+  bool surface_drawn_ = false;       // at the last look
+  bool loads_are_none_ = false;      // nothing was culled when they were taken last
 };
 
 }  // namespace solidcull

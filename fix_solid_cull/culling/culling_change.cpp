@@ -30,8 +30,12 @@ void Culling::change() {
   const auto timed = p_.report.time(Part::membership);
   follow_box();
   // another fix may have deleted granules in this hook
-  if (phase_ == Phase::stepping && p_.lost.forget_lost()) settle_bodies();
+  if (phase_ == Phase::stepping && p_.census.something_locked() && p_.lost.forget_lost()) settle_bodies();
   p_.ports.memory.freed(p_.exchange.begin_change());
+  if (!p_.census.something_locked() && !p_.ports.ranks.any(proposal_.any_here() || p_.wake.any_at_all())) {
+    open_for_insertion_ = false;  // nothing is culled, and nothing is to be
+    return;
+  }
   p_.refill.begin_change();
   MembershipChange c(p_.for_change(), p_.wake.take(p_.ports.ranks), proposal_.take());
   const bool changes = p_.ports.ranks.any(c.any_here() || p_.grounding.lets_go() || open_for_insertion_);

@@ -45,6 +45,7 @@ void Culling::look_at_once() {
 /// What is to be culled; what is exposed, or stands at walls that hold it, is seen on the way.
 Proposal Culling::survey(bool may_cull, bool any_culled) {
   const Patience patience = p_.pacing.patience(p_.census.something_locked());
+  surface_drawn_ = false;
   Proposal proposal;
   std::int64_t candidates[2] = {0, p_.ports.atoms.owned};  // of so many
   if (may_cull)
@@ -64,6 +65,7 @@ Proposal Culling::survey(bool may_cull, bool any_culled) {
   } else {
     const auto timed = p_.report.time(Part::depth);
     p_.cover.draw();
+    surface_drawn_ = true;
     p_.survey.choose_deep(patience, p_.cover, proposal);
     p_.survey.leave_out_unsteady(patience, proposal);
     p_.cover.wake_exposed();
@@ -109,7 +111,7 @@ void Culling::judge(bool may_cull, const Proposal& proposal) {
   std::int64_t work[4] = {static_cast<std::int64_t>(p_.motion.interface_atoms().size()),
                           static_cast<std::int64_t>(p_.solid.store().size()), restored_here, p_.ports.atoms.owned};
   ranks.sum(work, 4);
-  const Pacing::Verdict verdict = p_.pacing.judge({work[0], work[1], work[3], work[2], chosen, exterior}, step);
+  const Pacing::Verdict verdict = p_.pacing.judge({work[0], work[1], work[3], work[2], chosen, exterior, surface_drawn_}, step);
   if (verdict.wait == 0) return;
   p_.pacing.see_wait(verdict.wait, p_.survey.kinetic_energy_of_exterior(), step);
   if (verdict.give_back) {

@@ -23,6 +23,7 @@ class LostAtoms {
   /// The engine is given its atoms: what is in the shell now. Local.
   void remember() {
     before_.clear();
+    if (solid_.bodies().locked() == 0) return;
     for (int i = 0; i < ports_.atoms.owned; ++i)
       if (shell_[i].in_body())
         before_.push_back({ports_.atoms.tag[i], {ports_.atoms.mass[i], shell_[i].place, ports_.atoms.radius[i], shell_[i].held}});

@@ -26,6 +26,7 @@ struct Work {
   std::int64_t restored;  ///< since the last look at which culling was judged
   std::int64_t chosen;    ///< to be culled by this look
   std::int64_t exterior;
+  bool surface_drawn = false;  ///< at this look
 };
 
 /// Pure and local: it is told everything, and all ranks are told the same.
@@ -107,9 +108,9 @@ class Pacing {
     const double steps = static_cast<double>(step - std::max(judged_at_, step - every()));
     const double saved = steps * (CullingBenefit::interior * static_cast<double>(w.interior_granules) +
                                   CullingBenefit::interface * static_cast<double>(w.interface_granules));
-    const double spent =
-        static_cast<double>(w.atoms) * (CullingBenefit::look + CullingBenefit::build * static_cast<double>(builds_asked_)) +
-        CullingBenefit::wake * static_cast<double>(w.restored);
+    const double spent = static_cast<double>(w.atoms) * (CullingBenefit::look + (w.surface_drawn ? CullingBenefit::surface : 0) +
+                                                         CullingBenefit::build * static_cast<double>(builds_asked_)) +
+                         CullingBenefit::wake * static_cast<double>(w.restored);
     judged_at_ = step;
     builds_asked_ = 0;
     const std::int64_t culled = w.interface_granules + w.interior_granules;

@@ -28,7 +28,8 @@ double Report::value(int n) {
 void Report::count_totals() {
   double bodies = 0, interface_granules = 0;
   for (const auto& b : solid_.bodies().bodies()) bodies += groups_.has_key_of_first_part(b.first);
-  for (int i = 0; i < ports_.atoms.owned; ++i) interface_granules += shell_[i].locked;
+  if (solid_.bodies().locked() > 0)
+    for (int i = 0; i < ports_.atoms.owned; ++i) interface_granules += shell_[i].locked;
   const Ledger& ledger = solid_.ledger();
   const bool open = solid_.has_store();
   double sums[11] = {ports_.atoms.owned - interface_granules,

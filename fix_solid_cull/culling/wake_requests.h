@@ -57,6 +57,7 @@ class WakeRequests {
   }
 
   bool any_here() const { return !balls_.empty() || !bodies_.empty(); }  ///< but for ask_all()
+  bool any_at_all() const { return any_here() || all_; }
   bool asks_body(int key) const { return bodies_.count(key) != 0; }
 
   /// Collective.

@@ -162,10 +162,12 @@ void FixSolidCull::setup(int) {
 // ------------------------------------------------------------------------------------------------------------ a time step
 
 void FixSolidCull::pre_initial_integrate() {
+  if (culling_->idles()) return;
   hand_on([&] { culling_->initial_step(); });
 }
 
 void FixSolidCull::post_integrate() {
+  if (culling_->idles()) return;
   hand_on([&] { culling_->integrate(); });
 }
 
@@ -179,8 +181,10 @@ void FixSolidCull::pre_neighbor() {
 }
 
 void FixSolidCull::pre_force(int) {
-  walls_.begin_step();
-  hand_on([&] { culling_->leave_out_inner_pairs(); });
+  hand_on([&] {
+    walls_.begin_step(culling_->may_ask_for_wall_loads());
+    culling_->leave_out_inner_pairs();
+  });
 }
 
 void FixSolidCull::pre_final_integrate() {
@@ -188,6 +192,7 @@ void FixSolidCull::pre_final_integrate() {
 }
 
 void FixSolidCull::final_integrate() {
+  if (culling_->idles()) return;
   hand_on([&] { culling_->finish_step(); });
 }
 

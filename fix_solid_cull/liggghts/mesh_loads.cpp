@@ -52,7 +52,7 @@ void MeshLoads::connect() {
 
 void MeshLoads::contact(FixMeshSurface* fix, int granule, const double* force, const double* to_wall, int element) {
   for (MeshLoads* l : listeners())
-    for (std::size_t m = 0; m < l->meshes_.size(); ++m) {
+    for (std::size_t m = 0; l->watches_ && m < l->meshes_.size(); ++m) {
       const Mesh& mesh = l->meshes_[m];
       if (mesh.fix != fix || !mesh.still || !(l->atom->mask[granule] & fix->groupbit)) continue;
       WallLoad load;

@@ -24,8 +24,11 @@ class MeshLoads : protected LAMMPS_NS::Pointers {
 
   /// Finds the deck's meshes again; they come and go between runs, and keep their numbers.
   void connect();
-  /// The engine begins to compute forces: what was seen before is over.
-  void begin_step() { seen_.clear(); }
+  /// The engine begins to compute forces: what was seen before is over. `watch`: whether of() may be asked about these forces.
+  void begin_step(bool watch) {
+    seen_.clear();
+    watches_ = watch;
+  }
   /// What still elements did to the granule in this step.
   std::vector<WallLoad> of(std::int64_t tag);
 
@@ -50,7 +53,7 @@ class MeshLoads : protected LAMMPS_NS::Pointers {
   std::vector<Mesh> meshes_;        // by number
   std::vector<std::string> names_;  // their IDs
   std::vector<Seen> seen_;
-  bool sorted_ = false;
+  bool sorted_ = false, watches_ = true;
 };
 
 }  // namespace solidcull

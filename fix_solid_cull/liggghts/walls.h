@@ -20,7 +20,7 @@ class EngineWalls : public Walls {
     loads_.connect();
   }
   /// The engine begins to compute forces. Local.
-  void begin_step() { loads_.begin_step(); }
+  void begin_step(bool watch_loads) { loads_.begin_step(watch_loads); }
 
   std::vector<WallContact> contacts() const override { return contacts_.find(); }
   std::vector<WallTriangle> triangles() const override { return contacts_.triangles(); }

@@ -281,7 +281,7 @@ struct Floor {
 TEST(MeshLoads, OnGranulesAreTheOppositeOfWhatTheEngineSums) {
   Floor floor;
   std::map<int, std::vector<WallLoad>> seen;  // of this rank's granules
-  floor.mine.before_forces = [&] { floor.loads.begin_step(); };
+  floor.mine.before_forces = [&] { floor.loads.begin_step(true); };
   floor.mine.after_forces = [&] {
     const LAMMPS_NS::Atom* atom = floor.e.lammps()->atom;
     for (int i = 0; i < atom->nlocal; ++i) seen[atom->tag[i]] = floor.loads.of(atom->tag[i]);
@@ -362,10 +362,10 @@ TEST(MeshLoads, PressedOnAnElementAreReadInTheMeshsSums) {
   for (int d = 0; d < 6; ++d) EXPECT_NEAR(floor.total()[d], bare[d], 1e-9 * std::abs(bare[2]));
 }
 
-TEST(MeshLoads, OfAMeshThatMovesOrHasGoneAreNone) {
+TEST(MeshLoads, OfAMeshThatMovesOrHasGoneOrThatNobodyAsksAboutAreNone) {
   Floor floor;
   std::size_t loads = 0;
-  floor.mine.before_forces = [&] { floor.loads.begin_step(); };
+  floor.mine.before_forces = [&] { floor.loads.begin_step(true); };
   floor.mine.after_forces = [&] {
     loads = 0;
     for (int tag = 1; tag <= 5; ++tag) loads += floor.loads.of(tag).size();
@@ -376,6 +376,12 @@ TEST(MeshLoads, OfAMeshThatMovesOrHasGoneAreNone) {
     MPI_Allreduce(&mine, &all, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
     return all;
   };
+  floor.e.run("run 1\n");
+  EXPECT_EQ(seen(), 4);
+  floor.mine.before_forces = [&] { floor.loads.begin_step(false); };
+  floor.e.run("run 1\n");
+  EXPECT_EQ(seen(), 0) << "nobody will ask";
+  floor.mine.before_forces = [&] { floor.loads.begin_step(true); };
   floor.e.run("run 1\n");
   EXPECT_EQ(seen(), 4);
   floor.e.run("fix away all move/mesh mesh floor linear 0 0 -1e-6\nrun 0\n");

@@ -219,6 +219,18 @@ TEST(Pacing, rebuilds_that_only_culling_asked_for_are_counted_against_it) {
   EXPECT_EQ(v.wait, 4);
 }
 
+TEST(Pacing, a_look_that_draws_the_surface_is_dearer) {
+  Deck deck(10);
+  deck.pacing.begin_run(1, false);
+  Pacing::Verdict v;
+  // (2 + 1) 1000 > 10 290 > 2 1000
+  EXPECT_EQ(judge_until_it_waits(deck.pacing, {0, 290, 1000, 0, 0, 1000, true}, 10, v), 60);
+  EXPECT_EQ(v.wait, 4);
+  Deck undrawn(10);
+  undrawn.pacing.begin_run(1, false);
+  EXPECT_EQ(judge_until_it_waits(undrawn.pacing, {0, 290, 1000, 0, 0, 1000, false}, 10, v), -1);
+}
+
 TEST(Pacing, so_little_that_is_culled_is_given_back) {
   Deck deck(10);
   deck.pacing.begin_run(1, false);

@@ -14,6 +14,7 @@ from .errors import RunError
 ROOT = Path(__file__).resolve().parents[2]
 NAMED_BY = "SOLIDCULL_LAUNCHER"  # variable of the environment: another launcher than that of build/
 POLL = 0.02                      # s between two looks at a process
+COUNTED = ("instructions", "cycles")
 PATIENCE = 5                     # s that a process is given to stop
 
 
@@ -69,10 +70,11 @@ def stop_all():
 
 class Process:
     """A LIGGGHTS at work on a deck. What it prints is in the file `log`; with `screen`, LIGGGHTS itself writes the log, which is
-    then up to date wherever the deck says `flush yes`, and what it prints is in the file `screen`."""
+    then up to date wherever the deck says `flush yes`, and what it prints is in the file `screen`. With `count`, a file that perf
+    writes, instructions and cycles are counted where the machine lets perf do it. With `core` it stays on that one."""
 
-    def __init__(self, launcher, deck, folder, log, variables=None, ranks=1, screen=None):
-        self.log, self.screen = Path(log), screen and Path(screen)
+    def __init__(self, launcher, deck, folder, log, variables=None, ranks=1, screen=None, count=None, core=None):
+        self.log, self.screen, self.count = Path(log), screen and Path(screen), count and Path(count)
         command = [launcher, "-in", str(deck), *(["-log", str(log), "-echo", "log"] if screen else ["-log", "none", "-echo", "screen"])]
         for name, value in (variables or {}).items():
             command += ["-var", name, str(value)]
@@ -80,9 +82,13 @@ class Process:
             command = ["stdbuf", "-oL", *command]
         if ranks > 1:
             command = ["mpirun", "--oversubscribe", "-np", str(ranks), *command]
+        if count and shutil.which("perf"):
+            command = ["perf", "stat", "-x", ",", "-e", ",".join(f"{event}:u" for event in COUNTED), "-o", str(count), *command]
+        if core is not None and shutil.which("taskset"):
+            command = ["taskset", "-c", str(core), *command]
         if shutil.which("setpriv"):  # a driver that is killed leaves no run behind
             command = ["setpriv", "--pdeathsig", "KILL", *command]
-        self.wall = self.cpu = None  # s: from start to end, and of processors, once it has ended
+        self.wall = self.cpu = self.user = None  # s: from start to end, and of processors, once it has ended
         self.began = time.monotonic()
         with open(screen or log, "w") as f:
             self.child = subprocess.Popen(command, cwd=folder, env=environment(ranks), stdin=subprocess.DEVNULL, stdout=f,
@@ -93,13 +99,20 @@ class Process:
 
     def note_the_end(self):
         _, status, used = os.wait4(self.child.pid, 0)
-        self.wall, self.cpu = time.monotonic() - self.began, used.ru_utime + used.ru_stime
+        self.wall, self.cpu, self.user = time.monotonic() - self.began, used.ru_utime + used.ru_stime, used.ru_utime
         self.child.returncode = os.waitstatus_to_exitcode(status)
         RUNNING.discard(self)
 
     def ended(self):
         """Whether it has ended; then `wall` and `cpu` are known."""
         return not self.waiter.is_alive()
+
+    def counted(self):
+        """Instructions and cycles, once it has ended: {} where none were counted."""
+        if not (self.count and self.count.exists()):
+            return {}
+        rows = [line.split(",") for line in self.count.read_text().splitlines()]
+        return {event: float(row[0]) for row in rows for event in COUNTED if len(row) > 2 and row[2].startswith(event) and row[0].isdigit()}
 
     def text(self):
         """Its log, once it has ended well; RunError if it has not."""
