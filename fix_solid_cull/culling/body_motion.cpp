@@ -88,7 +88,6 @@ void BodyMotion::take_loads() {
   const bool moves = scales_.rigid(), turns = ports_.contacts.turn_granules;
   const Vec3 g = ports_.run.gravity();
   const WakeUpLaw& law = scales_.wake_up();
-  const double weight = law.weight_of_step(ports_.run.dt);
   Atoms& atoms = ports_.atoms;
   for (ActiveBody& a : active_) a.force = a.torque = a.change = Vec3::Zero();
   for (std::size_t k = 0; k < atoms_.size(); ++k) {
@@ -99,7 +98,7 @@ void BodyMotion::take_loads() {
     if (moves && !a.stands) add_to_body(k, in_world - atoms.mass[i] * g, turns ? torque : Vec3(Vec3::Zero()));
     if (a.stands) a.change += in_world - atoms.mass[i] * g;
     const double tolerance = law.tolerance(atoms.mass[i], shell_[i].normal_load);
-    largest_excess_ = std::max(largest_excess_, shell_.take_load(i, a.body->pose.turned_to_frame(in_world), tolerance, weight));
+    largest_excess_ = std::max(largest_excess_, shell_.take_load(i, a.body->pose.turned_to_frame(in_world), tolerance));
     atoms.clear_force(i);
     if (turns) atoms.clear_torque(i);  // else what walls turn is the granule alone: the engine's integrator sees to that
   }

@@ -222,7 +222,7 @@ void Culling::collect_wakes() {
   if (!p_.census.something_locked()) return;
   const Ranks& ranks = p_.ports.ranks;
   const int period = p_.pacing.wake_period();
-  const bool blow = p_.motion.largest_excess() > WakeUpLaw::blow;
+  const bool blow = p_.motion.largest_excess() > Pacing::blow;
   if (!p_.pacing.wakes_now(p_.ports.run.step) && !ranks.any(blow)) return;
   bool waking = false;
   for (const int i : p_.motion.interface_atoms()) {

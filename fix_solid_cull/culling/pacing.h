@@ -56,6 +56,8 @@ class Pacing {
   /// steps: one rebuild of the neighbour lists does for what wakes and what is culled.
   int wake_period() const { return (wake_cycle() + wakes_in_a_cycle() - 1) / wakes_in_a_cycle(); }
   bool wakes_now(std::int64_t step) const { return step % wake_cycle() % wake_period() == 0; }
+  /// A load change of so many tolerances does not wait: what it strikes would stand like a rock until then.
+  static constexpr double blow = 10;
 
   /// The first look comes before the first step: a bed that was read at rest is culled by its velocities and forces alone.
   bool looks_at_once() const { return looks_at_once_; }

@@ -12,7 +12,6 @@
 #include "ports.h"
 #include "pose.h"
 #include "solid_bodies.h"
-#include "wake_up.h"
 
 namespace solidcull {
 
@@ -28,7 +27,6 @@ struct Locked {
   Vec3 place = Vec3::Zero();        ///< in the body's frame (m)
   Vec3 reference = Vec3::Zero();    ///< F_ext at locking, re-based when contacts change sides; frame of the body (N)
   Vec3 load_change = Vec3::Zero();  ///< F_ext - reference at the last step; frame of the body (N)
-  Vec3 lasting = Vec3::Zero();      ///< running average of it, see WakeUpLaw::averaging_time; likewise (N)
   double normal_load = not_known;   ///< sum of normal contact forces at locking (N)
   double excess = 0;                ///< largest load change over tolerance since it was last asked
   std::int64_t lock_step = -1;
@@ -37,12 +35,12 @@ struct Locked {
 
   bool in_body() const { return locked && body > 0; }
 
-  static constexpr int packed_size = 21;
+  static constexpr int packed_size = 18;
   void pack(double* to) const {
-    const double values[packed_size] = {
-        double(locked), double(fresh),  double(held), reference[0], reference[1],      reference[2], load_change[0],
-        load_change[1], load_change[2], normal_load,  excess,       double(lock_step), velocity[0],  velocity[1],
-        velocity[2],    spin[0],        spin[1],      spin[2],      lasting[0],        lasting[1],   lasting[2]};
+    const double values[packed_size] = {double(locked), double(fresh),     double(held),   reference[0],   reference[1],
+                                        reference[2],   load_change[0],    load_change[1], load_change[2], normal_load,
+                                        excess,         double(lock_step), velocity[0],    velocity[1],    velocity[2],
+                                        spin[0],        spin[1],           spin[2]};
     std::copy_n(values, packed_size, to);
   }
   static Locked unpack(const double* v) {
@@ -57,7 +55,6 @@ struct Locked {
     l.lock_step = static_cast<std::int64_t>(v[11]);
     l.velocity = vec(v + 12);
     l.spin = vec(v + 15);
-    l.lasting = vec(v + 18);
     return l;
   }
 };
@@ -75,7 +72,7 @@ class Shell : public FollowsAtoms {
   void lock(Atoms& atoms, int i, std::int64_t step, double normal_load, bool held) {
     Locked& e = rows_[i];
     e.locked = e.fresh = true;
-    e.load_change = e.lasting = Vec3::Zero();
+    e.load_change = Vec3::Zero();
     e.normal_load = normal_load;
     e.excess = 0;
     e.held = held;
@@ -106,7 +103,7 @@ class Shell : public FollowsAtoms {
     e.locked = e.fresh = true;
     e.body = g.body;
     e.place = g.position;
-    e.load_change = e.lasting = g.load_change;
+    e.load_change = g.load_change;
     e.normal_load = g.normal_load;
     e.held = g.held;
     e.came_back = step;
@@ -128,7 +125,6 @@ class Shell : public FollowsAtoms {
     e.place = to.to_frame(from.to_world(e.place));
     e.reference = to.turned_to_frame(from.turned_to_world(e.reference));
     e.load_change = to.turned_to_frame(from.turned_to_world(e.load_change));
-    e.lasting = to.turned_to_frame(from.turned_to_world(e.lasting));
   }
   void set_body(int i, int body) { rows_[i].body = body; }
   /// The frame becomes the world's.
@@ -153,23 +149,19 @@ class Shell : public FollowsAtoms {
     stands(i, at);
     e.reference = pose.turned_to_frame(e.reference);
     e.load_change = pose.turned_to_frame(e.load_change);
-    e.lasting = pose.turned_to_frame(e.lasting);
   }
 
   /// A contact has changed sides: this load (world frame, N) is no change for the granule (invariant I5).
   void rebase(int i, const Vec3& by) { rows_[i].reference += bodies_.pose(rows_[i].body).turned_to_frame(by); }
-  /// The load on it in this step, in the frame of its body (N); returns the largest load change over `tolerance` that it has had,
-  /// as it lasts or as a blow. `weight`: of this step in what lasts.
-  double take_load(int i, const Vec3& load, double tolerance, double weight) {
+  /// The load on it in this step, in the frame of its body (N); returns the largest load change over `tolerance` that it has had.
+  double take_load(int i, const Vec3& load, double tolerance) {
     Locked& e = rows_[i];
     if (e.fresh) {
       e.reference = load - e.load_change;
       e.fresh = false;
     }
     e.load_change = load - e.reference;
-    e.lasting += weight * (e.load_change - e.lasting);
-    double square = e.load_change.squaredNorm();
-    if (square <= WakeUpLaw::blow * WakeUpLaw::blow * tolerance * tolerance) square = e.lasting.squaredNorm();
+    const double square = e.load_change.squaredNorm();
     if (square > e.excess * e.excess * tolerance * tolerance) e.excess = std::sqrt(square) / tolerance;
     return e.excess;
   }
@@ -218,7 +210,6 @@ class Shell : public FollowsAtoms {
   static void loads_to_world(Locked& e, const Pose& pose) {
     e.reference = pose.turned_to_world(e.reference);
     e.load_change = pose.turned_to_world(e.load_change);
-    e.lasting = pose.turned_to_world(e.lasting);
   }
 
   const SolidBodies& bodies_;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 
 #include "sphere.h"
 
@@ -15,7 +14,6 @@ struct WakeUpLaw {
   double gravity;                        ///< |g| in m/s^2
   double carve_radius;                   ///< r0 in m
   double carve_cap;                      ///< largest growth of r0
-  double averaging = 0;                  ///< time constant over which load changes are averaged (s); 0: not at all
   static constexpr double growth = 0.5;  ///< c of the carve law
   static constexpr double direction_share = 1.0 / 120,
                           size_share = 1.0 / 12;  ///< for A = 1: 2.5 % and 25 % at the default tolerance
@@ -32,17 +30,6 @@ struct WakeUpLaw {
     if (normal_load < 0) return most;
     return std::clamp(own_share * normal_load, least_share * most, most) + relative * normal_load;
   }
-
-  /// A load change counts when it lasts: the shake of a wave, there and back, moves nothing. In this time (s) one of A weights
-  /// would take a free granule d/500 at the default tolerance; shorter at smaller ones, so that the error goes with them.
-  static double averaging_time(double absolute, double diameter, double gravity) {
-    constexpr double share = 1.0 / 80, most = 3;
-    return share * std::min(absolute, most) * std::sqrt(diameter / gravity);
-  }
-  /// Share of a step's load change in the running average.
-  double weight_of_step(double dt) const { return averaging > 0 ? -std::expm1(-dt / averaging) : 1.0; }
-  /// A load change of so many tolerances is a blow and counts at once: what strikes would meet a rock until then.
-  static constexpr double blow = 10;
 
   /// |F_ext - F_ext(at locking)| over the tolerance; the granule wakes above 1.
   double excess(const Vec3& load, const Vec3& load_at_locking, double mass, double normal_load) const;

@@ -44,19 +44,6 @@ TEST(WakeUpLaw, a_load_taken_away_counts_as_one_put_on) {
   EXPECT_DOUBLE_EQ(law.excess(Vec3(Vec3::Zero()), locked, mass, 0), 0.2 / law.tolerance(mass, 0));
 }
 
-TEST(WakeUpLaw, a_load_change_must_last_for_the_time_in_which_it_would_move_a_granule_by_d_500) {
-  constexpr double d = 2.6e-3;
-  const double time = WakeUpLaw::averaging_time(3, d, g);
-  EXPECT_NEAR(0.5 * 3 * g * time * time, d / 500, 0.1 * d / 500);
-  EXPECT_DOUBLE_EQ(WakeUpLaw::averaging_time(0.3, d, g), 0.1 * time);  // the error goes with the tolerance
-  EXPECT_DOUBLE_EQ(WakeUpLaw::averaging_time(30, d, g), time);
-  const WakeUpLaw at_once{3.0, 0.0, g, r0, 4.0}, lasting{3.0, 0.0, g, r0, 4.0, time};
-  EXPECT_EQ(at_once.weight_of_step(1e-5), 1.0);
-  EXPECT_NEAR(lasting.weight_of_step(1e-3 * time), 1e-3, 1e-6);
-  EXPECT_NEAR(lasting.weight_of_step(time), 1 - std::exp(-1), 1e-12);
-  EXPECT_NEAR(lasting.weight_of_step(100 * time), 1.0, 1e-12);
-}
-
 TEST(WakeUpLaw, the_carved_ball_grows_with_the_logarithm_of_the_excess) {
   EXPECT_DOUBLE_EQ(law.radius(1), r0);
   EXPECT_DOUBLE_EQ(law.radius(2), 1.5 * r0);
