@@ -2,16 +2,15 @@
 #pragma once
 
 #include <cstdint>
-#include <cstring>
+
+#include "bits.h"
 
 namespace solidcull {
 
 class WordSum {
  public:
   void add(double x) {
-    std::uint64_t word;
-    std::memcpy(&word, &x, sizeof word);
-    sum_ = (sum_ ^ word) * 1099511628211u;
+    sum_ = (sum_ ^ bits_of(x)) * 1099511628211u;
     sum_ ^= sum_ >> 32;
   }
   std::uint64_t value() const { return sum_; }

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <string>
 
+#include "bits.h"
 #include "store_exchange.h"
 
 namespace solidcull {
@@ -11,16 +12,6 @@ namespace {
 
 constexpr int granules_per_chunk = 4096;
 
-std::uint64_t bits(double x) {
-  std::uint64_t word;
-  std::memcpy(&word, &x, sizeof word);
-  return word;
-}
-double number(std::uint64_t word) {
-  double x;
-  std::memcpy(&x, &word, sizeof x);
-  return x;
-}
 std::uint64_t whole(std::int64_t x) { return static_cast<std::uint64_t>(x); }
 
 // columns of the tables
@@ -44,15 +35,16 @@ enum InteriorColumn {
 };
 
 void put(std::uint64_t* to, const Vec3& v) {
-  for (int d = 0; d < 3; ++d) to[d] = bits(v[d]);
+  for (int d = 0; d < 3; ++d) to[d] = bits_of(v[d]);
 }
-Vec3 vector_of(const std::uint64_t* from) { return {number(from[0]), number(from[1]), number(from[2])}; }
+Vec3 vector_of(const std::uint64_t* from) { return {number_of(from[0]), number_of(from[1]), number_of(from[2])}; }
 void put(std::uint64_t* to, const Pose& p) {
   put(to, p.origin());
-  for (int k = 0; k < 4; ++k) to[3 + k] = bits(p.quaternion().coeffs()[k]);
+  for (int k = 0; k < 4; ++k) to[3 + k] = bits_of(p.quaternion().coeffs()[k]);
 }
 Pose pose_of(const std::uint64_t* from) {
-  return Pose(vector_of(from), Eigen::Quaterniond(number(from[6]), number(from[3]), number(from[4]), number(from[5])));
+  return Pose(vector_of(from),
+              Eigen::Quaterniond(number_of(from[6]), number_of(from[3]), number_of(from[4]), number_of(from[5])));
 }
 
 /// Mixes a word into a sum that does not depend on the order in which granules come.
@@ -62,7 +54,7 @@ std::uint64_t mixed(std::uint64_t sum, std::uint64_t word) {
 }
 std::uint64_t mixed(std::uint64_t tag, int body, const Vec3& place) {
   std::uint64_t sum = mixed(mixed(1, tag), whole(body));
-  for (int d = 0; d < 3; ++d) sum = mixed(sum, bits(place[d]));
+  for (int d = 0; d < 3; ++d) sum = mixed(sum, bits_of(place[d]));
   return sum;
 }
 
@@ -138,7 +130,7 @@ void ChunkSource::part(SectionChunk& chunk) {
     numbers.clear();
     b.each_number([&](auto& x) { numbers.push_back(static_cast<double>(x)); });
     if (table.rows == 0) table.clear(numbers.size());
-    std::transform(numbers.begin(), numbers.end(), table.add_row(), bits);
+    std::transform(numbers.begin(), numbers.end(), table.add_row(), bits_of);
   }
   pack_columns(table, chunk.bytes);
 }
@@ -162,7 +154,7 @@ void ChunkSource::contact(std::int64_t low, std::int64_t high, const double* his
   row[c_high] = whole(high);
   row[c_body] = static_cast<std::uint64_t>(at - bodies_.begin());
   row[c_known] = history != nullptr;
-  if (history) std::transform(history, history + history_.size(), row + c_history, bits);
+  if (history) std::transform(history, history + history_.size(), row + c_history, bits_of);
 }
 
 /// With granules that came before, and with those that are not on this rank.
@@ -200,8 +192,8 @@ void ChunkSource::interface_block(SectionChunk& chunk) {
     row[i_tag] = whole(atoms.tag[atom_]);
     row[i_body] = static_cast<std::uint64_t>(std::lower_bound(bodies_.begin(), bodies_.end(), e.body) - bodies_.begin());
     put(row + i_place, e.place);
-    row[i_radius] = bits(atoms.radius[atom_]);
-    row[i_mass] = bits(atoms.mass[atom_]);
+    row[i_radius] = bits_of(atoms.radius[atom_]);
+    row[i_mass] = bits_of(atoms.mass[atom_]);
     row[i_held] = e.held;
     contacts_of(atoms.tag[atom_]);
   }
@@ -222,12 +214,12 @@ void ChunkSource::interior_block(SectionChunk& chunk) {
     row[g_tag] = whole(g.tag);
     row[g_body] = static_cast<std::uint64_t>(std::lower_bound(bodies_.begin(), bodies_.end(), g.body) - bodies_.begin());
     put(row + g_place, g.position);
-    row[g_radius] = bits(g.radius);
-    row[g_mass] = bits(g.mass);
+    row[g_radius] = bits_of(g.radius);
+    row[g_mass] = bits_of(g.mass);
     row[g_type] = whole(g.type);
     row[g_layout] = whole(g.layout);
     row[g_step] = whole(g.lock_step);
-    row[g_normal] = bits(g.normal_load);
+    row[g_normal] = bits_of(g.normal_load);
     put(row + g_change, g.load_change);
     row[g_walls] = whole(g.walls);
     row[g_held] = g.held;
@@ -276,7 +268,7 @@ auto ChunkReader::part(const SectionChunk& chunk) -> const Head& {
   for (std::size_t r = 0; r < table.rows; ++r) {
     std::size_t c = 0;
     sender->bodies[r].each_number([&](auto& x) {
-      x = static_cast<std::decay_t<decltype(x)>>(number(table.row(r)[index_below(c, table.columns)]));
+      x = static_cast<std::decay_t<decltype(x)>>(number_of(table.row(r)[index_below(c, table.columns)]));
       ++c;
     });
   }
@@ -297,8 +289,8 @@ const Parcel& ChunkReader::parcel(const SectionChunk& chunk) {
     g.tag = static_cast<std::int64_t>(row[i_tag]);
     g.body = static_cast<int>(index_below(row[i_body], head_.sender->bodies.size()));
     g.place = vector_of(row + i_place);
-    g.radius = number(row[i_radius]);
-    g.mass = number(row[i_mass]);
+    g.radius = number_of(row[i_radius]);
+    g.mass = number_of(row[i_mass]);
     g.held = row[i_held] != 0;
     parcel_.granules.push_back(g);
   }
@@ -342,8 +334,8 @@ void ChunkReader::read_interior(const WordTable& table, std::vector<double>& num
     g.tag = static_cast<std::int64_t>(row[g_tag]);
     g.body = static_cast<int>(index_below(row[g_body], head_.sender->bodies.size()));
     g.place = vector_of(row + g_place);
-    g.radius = number(row[g_radius]);
-    g.mass = number(row[g_mass]);
+    g.radius = number_of(row[g_radius]);
+    g.mass = number_of(row[g_mass]);
     g.held = row[g_held] != 0;
     StoredGranule& s = g.stored;
     s.tag = g.tag;
@@ -354,7 +346,7 @@ void ChunkReader::read_interior(const WordTable& table, std::vector<double>& num
     s.layout = layout_[index_below(row[g_layout], layout_.size())];
     s.lock_step = static_cast<std::int64_t>(row[g_step]);
     if (scales_.image_by_place()) s.lock_step = std::min(s.lock_step, StoreExchange::locked_long_ago);
-    s.normal_load = number(row[g_normal]);
+    s.normal_load = number_of(row[g_normal]);
     s.load_change = vector_of(row + g_change);
     s.walls = static_cast<int>(row[g_walls]);
     s.held = g.held;

@@ -2,23 +2,17 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
 #include <sstream>
 
 #include "atom.h"
 #include "atom_vec.h"
+#include "bits.h"
 #include "fix.h"
 #include "internal_error.h"
 #include "modify.h"
 
 namespace solidcull {
 namespace {
-
-std::uint64_t bits(double x) {
-  std::uint64_t word;
-  std::memcpy(&word, &x, sizeof word);
-  return word;
-}
 
 /// AtomVec packs its own columns and then every fix's; with no fixes named it packs its own alone.
 class AtomStyleOnly {
@@ -102,7 +96,7 @@ std::vector<int> GranuleRecords::motion_words(int i, bool positions, bool spins)
     atom->avec->pack_exchange(i, after.data());
     *number = kept;
     for (int w = 0; w < length; ++w)
-      if (bits(before[w]) != bits(after[w])) words.push_back(w);
+      if (bits_of(before[w]) != bits_of(after[w])) words.push_back(w);
   }
   std::sort(words.begin(), words.end());
   return words;
@@ -122,7 +116,7 @@ int GranuleRecords::groups_word(int i) {
 }
 
 /// The engine packs whole numbers by their bits.
-int GranuleRecords::whole_number(double packed) { return static_cast<int>(bits(packed)); }
+int GranuleRecords::whole_number(double packed) { return static_cast<int>(bits_of(packed)); }
 
 void GranuleRecords::remove(int i) {
   if (i != atom->nlocal - 1) atom->avec->copy(atom->nlocal - 1, i, 1);

@@ -5,21 +5,13 @@
 #include <stdexcept>
 #include <string>
 
+#include "bits.h"
+
 namespace solidcull {
 namespace {
 
 constexpr std::uint32_t empty_entry = UINT32_MAX;
 
-std::uint64_t bits_of(double x) {
-  std::uint64_t word;
-  std::memcpy(&word, &x, sizeof word);
-  return word;
-}
-double number_of(std::uint64_t word) {
-  double x;
-  std::memcpy(&x, &word, sizeof x);
-  return x;
-}
 /// Two ints in one word.
 std::uint64_t pair_of(int low, int high) {
   return static_cast<std::uint64_t>(static_cast<std::uint32_t>(high)) << 32 | static_cast<std::uint32_t>(low);
