@@ -206,6 +206,18 @@ class Validation(Scripts):
         self.assertEqual({c["lost"] for c in choices.values()}, {0})
         self.assertGreater(choices["sleep"]["over_exterior"], choices["live"]["over_exterior"])
 
+    def test_scale_tools(self):
+        folder = ROOT / "validation" / "scale"
+        tools = self.run_script(folder / "tools.py", folder / "out" / "few" / "tools.json")
+        self.assertEqual(list(tools), ["tiny blade", "tiny block", "tiny wheel", "tiny pour"])
+        for tool, c in tools.items():
+            with self.subTest(tool=tool):
+                self.assertEqual((c["lost"], c["ids_good"]), (0, True))
+                self.assertGreater(c["interface"], 0)
+                self.assertLess(c["exterior"], 700)
+                self.close(c, 0.02, "floor load, largest (N)")
+        self.assertEqual(tools["tiny pour"]["movers"], 20, "those that are poured move, and no other")
+
     def test_no_harm(self):
         few = ROOT / "validation" / "no_harm" / "out" / "few"
         for old in few.glob("*.json"):
