@@ -272,24 +272,46 @@ def figures_of(scene, kind, text, made_bed, final, loads):
     return figures
 
 
-def check_few(run, text, granules, steps):
-    """Raises RunError, one line, where a run of a few steps shows that its deck is broken."""
+def what_is_broken(run, text, granules):
+    """What a run of a few steps shows to be broken in its deck, as words; none if nothing is."""
     broken = [name for name, value in run["metrics"].items() if not math.isfinite(value)]
     if not logs.reached_the_end(text):
-        wrong = "did not reach the end of its deck"
-    elif run["steps"] != steps:
+        return "did not reach the end of its deck"
+    if run["granules"] != granules:
+        return f"ended with {run['granules']} granules, not {granules}"
+    return f"has no number for {', '.join(broken)}" if broken else None
+
+
+def check_few(run, text, granules, steps):
+    """Raises RunError, one line, where a run of a few steps shows that its deck is broken."""
+    wrong = what_is_broken(run, text, granules)
+    if not wrong and run["steps"] != steps:
         wrong = f"made {run['steps']} steps, not {steps}"
-    elif run["granules"] != granules:
-        wrong = f"ended with {run['granules']} granules, not {granules}"
-    elif broken:
-        wrong = f"has no number for {', '.join(broken)}"
-    elif run["kind"] in CULLED and run["wholes"] != [[granules, granules]] * 2:
+    elif not wrong and run["kind"] in CULLED and run["wholes"] != [[granules, granules]] * 2:
         wrong = f"held {run['wholes']} granules on the way, not {granules}"
-    elif run["kind"] in CULLED and run["variables"]["culling"] == SLEEP and not run["interior"] > 0:
+    elif not wrong and run["kind"] in CULLED and run["variables"]["culling"] == SLEEP and not run["interior"] > 0:
         wrong = "locked no granule"  # with a cover of its own the tiny bed may well lock none
-    else:
-        return
-    raise errors.RunError(f"few steps: {run['name']} {wrong}")
+    if wrong:
+        raise errors.RunError(f"few steps: {run['name']} {wrong}")
+
+
+def recipe_of(lines, files, variables, made_bed, kind):
+    """What the figures of a run depend on, as a hash: its deck, the files that this includes, and what it is given."""
+    return hashlib.sha1(json.dumps([decks.without_comments(lines), text_of(*files), variables, made_bed["hash"],
+                                    engine.hash_of_fix(engine.find_launcher()) if kind in CULLED else ""]).encode()).hexdigest()
+
+
+def kept_run(file, recipe, table):
+    """The figures that a run has left, if they are of this recipe, or `table` wants what is there; else none."""
+    old = json.loads(file.read_text()) if file.exists() else None
+    return {**old, "stale": old["recipe"] != recipe} if old and (table or old["recipe"] == recipe and not few_steps) else None
+
+
+def keep(file, run):
+    """Leaves a run's figures in the file, whole or not at all."""
+    file.with_suffix(".part").write_text(json.dumps(run) + "\n")
+    file.with_suffix(".part").rename(file)
+    return {**run, "stale": False}
 
 
 def one_run(scene, size, kind, k, settings, of=""):
@@ -314,11 +336,9 @@ def one_run(scene, size, kind, k, settings, of=""):
     lines = deck_of(scene, kind)
     if size in LAID:  # a bed of this size is not to be atoms at the end
         lines = [line for line in lines if "${final}" not in line and not line.startswith("unfix cull")]
-    recipe = hashlib.sha1(json.dumps([decks.without_comments(lines), text_of("scene.in", "ball.in", "material.in", "bed.in"), variables, made_bed["hash"],
-                                      engine.hash_of_fix(engine.find_launcher()) if kind in CULLED else ""]).encode()).hexdigest()
-    old = json.loads(kept.read_text()) if kept.exists() else None
-    if old and (settings.table or (old["recipe"] == recipe and not few_steps)):
-        return {**old, "stale": old["recipe"] != recipe}
+    recipe = recipe_of(lines, ("scene.in", "ball.in", "material.in", "bed.in"), variables, made_bed, kind)
+    if old := kept_run(kept, recipe, settings.table):
+        return old
     if settings.table:
         return None
     deck.write_text("\n".join(lines).replace("${final}", str(final)) + "\n")  # no variable is put into quotes
@@ -338,10 +358,9 @@ def one_run(scene, size, kind, k, settings, of=""):
     final.unlink(missing_ok=True)
     if restart != made_bed["restart"]:
         restart.unlink()
-    kept.with_suffix(".part").write_text(json.dumps(run) + "\n")
-    kept.with_suffix(".part").rename(kept)
+    run = keep(kept, run)
     print(f"  {name}: {run['loop_time']:.1f} s, with what is before {run['wall']:.1f} s, peak {run['peak_mb']:.0f} MB", flush=True)
-    return {**run, "stale": False}
+    return run
 
 
 # --- the comparison -------------------------------------------------------------------------------------------------

@@ -12,14 +12,13 @@ Exit: 0 all runs there and no granule lost, 1 else, 2 a run failed.
 import argparse
 import hashlib
 import json
-import math
 import re
 import statistics
 
 import numpy as np
 
 import scale
-from solidcull_runs import decks, engine, errors, logs, meshes, metrics, tables  # scale.py has made them known
+from solidcull_runs import decks, errors, logs, meshes, metrics, tables  # scale.py has made them known
 from solidcull_runs.dumps import read_final, snapshots
 from solidcull_runs.surfaces import height_map
 
@@ -93,7 +92,7 @@ def movers(file):
 
 
 def joined(text):
-    """Columns of all the thermo tables between the fix line and the end of the deck, as one series; their loop time; output in it."""
+    """Columns of all the thermo tables between the fix line and the end of the deck, as one series; their loop time (s)."""
     found = [t for t in logs.parse_log(text) if t.counted and t.loop_time is not None]
     names = found[0].columns
     rows = np.array([row for n, t in enumerate(found) for row in t.rows[n > 0:]])
@@ -121,11 +120,9 @@ def one_run(name, size, kind, k, settings):
     lines = decks.make_deck(decks.read_deck(scale.HERE / f"tool_{name}.in"), "cull", kind == "culled", None, "${base}")
     drop = ("twin_counts", *(() if kind == "unculled" and k == 0 else ("dump places", "undump places")))
     lines = [line.replace("${base}.final", "${final}") for line in lines if not any(word in line for word in drop)]
-    recipe = hashlib.sha1(json.dumps([decks.without_comments(lines), scale.text_of("tool.in", "scene.in", "material.in", "bed.in"), variables,
-                                      made_bed["hash"], engine.hash_of_fix(engine.find_launcher()) if kind == "culled" else ""]).encode()).hexdigest()
-    old = json.loads(kept.read_text()) if kept.exists() else None
-    if old and (settings.table or (old["recipe"] == recipe and not settings.few_steps)):
-        return {**old, "stale": old["recipe"] != recipe}
+    recipe = scale.recipe_of(lines, ("tool.in", "scene.in", "material.in", "bed.in"), variables, made_bed, kind)
+    if old := scale.kept_run(kept, recipe, settings.table):
+        return old
     if settings.table:
         return None
     deck.write_text("\n".join(lines).replace("${final}", str(final)) + "\n")
@@ -149,27 +146,12 @@ def one_run(name, size, kind, k, settings):
         run["said"] = re.findall(r"^fix cull solid/cull: (.*)$", text, re.M)[-2:]
     final.unlink()
     if settings.few_steps:
-        check_few(run, text, variables["granules"] + given.get("poured", 0))
-    kept.with_suffix(".part").write_text(json.dumps(run) + "\n")
-    kept.with_suffix(".part").rename(kept)
+        wrong = scale.what_is_broken(run, text, variables["granules"] + given.get("poured", 0))
+        if wrong or run.get("movers") == 0:
+            raise errors.RunError(f"few steps: {base} {wrong or 'moved no granule'}")
+    run = scale.keep(kept, run)
     print(f"  {base}: {run['loop_time']:.1f} s", flush=True)
-    return {**run, "stale": False}
-
-
-def check_few(run, text, granules):
-    """Raises RunError, one line, where a run of a few steps shows that its deck is broken."""
-    broken = [name for name, value in run["metrics"].items() if not math.isfinite(value)]
-    if not logs.reached_the_end(text):
-        wrong = "did not reach the end of its deck"
-    elif run["granules"] != granules:
-        wrong = f"ended with {run['granules']} granules, not {granules}"
-    elif broken:
-        wrong = f"has no number for {', '.join(broken)}"
-    elif run.get("movers") == 0:
-        wrong = "moved no granule"
-    else:
-        return
-    raise errors.RunError(f"few steps: {run['name']} {wrong}")
+    return run
 
 
 def compared(unculled, culled):
