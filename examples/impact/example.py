@@ -59,7 +59,7 @@ IMPACT = examples.Example(
     sources=("bed.in", "floor.stl"), granules=20001, steps=8000, wanted=METRICS, figures=crater, plot=plot, moments=moments,
     files_every=400, vdb_every=4000, vary=("dx", APART), runs=5, at_once=2,
     few={"L": 0.02, "bed_granules": 900, "steps": 700}, few_bed={"L": 0.02, "bed_granules": 900, "dampsteps": 1000, "freesteps": 50},
-    few_granules=901, few_steps=700, few_files_every=100, few_keywords="every 20 calm 1 speed 0.1")
+    few_granules=901, few_steps=700, few_files_every=100, few_keywords="every 20")
 
 if __name__ == "__main__":
     errors.command("impact", lambda: examples.main(IMPACT))

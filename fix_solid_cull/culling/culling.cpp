@@ -228,7 +228,7 @@ void Culling::collect_wakes() {
   for (const int i : p_.motion.interface_atoms()) {
     const double excess = p_.shell.take_excess(i);
     if (excess <= 1) continue;
-    p_.wake.ask(p_.ports.atoms.place(i), p_.scales.wake_up().radius(excess));
+    p_.wake.ask_by_load(p_.ports.atoms.place(i), p_.scales.wake_up().radius(excess));
     waking = true;
   }
   const bool rigid = p_.scales.rigid();

@@ -37,7 +37,7 @@ void Culling::change() {
     return;
   }
   p_.refill.begin_change();
-  MembershipChange c(p_.for_change(), p_.wake.take(p_.ports.ranks), proposal_.take());
+  MembershipChange c(p_.for_change(), p_.wake.take(p_.ports.ranks, p_.scales.wake_up()), proposal_.take());
   const bool changes = p_.ports.ranks.any(c.any_here() || p_.grounding.lets_go() || open_for_insertion_);
   bool shell_changed = false;
   p_.grounding.let_go();

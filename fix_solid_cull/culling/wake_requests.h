@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "ports.h"
+#include "sphere_cells.h"
+#include "wake_up.h"
 
 namespace solidcull {
 
@@ -38,7 +40,9 @@ struct Wakes {
 /// Collects on this rank; take() gives what all ranks collected, and is empty afterwards.
 class WakeRequests {
  public:
-  void ask(const Vec3& centre, double radius) { balls_.push_back({centre, radius}); }
+  void ask(const Vec3& centre, double radius) { asked_.push_back({triple(centre), radius, false}); }
+  /// Its load has changed: where many ask so beside each other, their balls are those of a front.
+  void ask_by_load(const Vec3& centre, double radius) { asked_.push_back({triple(centre), radius, true}); }
   void ask_body(int key) { bodies_.insert(key); }
   void ask_all() { all_ = true; }
   /// A ball around each place. Where these are a large share of the granules that are locked, `locked` on this rank, or would
@@ -56,23 +60,22 @@ class WakeRequests {
     }
   }
 
-  bool any_here() const { return !balls_.empty() || !bodies_.empty(); }  ///< but for ask_all()
+  bool any_here() const { return !asked_.empty() || !bodies_.empty(); }  ///< but for ask_all()
   bool any_at_all() const { return any_here() || all_; }
   bool asks_body(int key) const { return bodies_.count(key) != 0; }
 
   /// Collective.
-  Wakes take(const Ranks& ranks) {
-    struct Row {
-      Triple centre;
-      double radius;
-    };
-    std::vector<Row> rows;
-    for (const Ball& b : balls_) rows.push_back({triple(b.centre), b.radius});
-    balls_.clear();
+  Wakes take(const Ranks& ranks, const WakeUpLaw& law) {
     Wakes w;
-    for (const Row& r : ranks.gather(rows)) {
-      ++w.carves;
-      for (const Vec3& shift : ranks.image_shifts()) w.balls.push_back({vec(r.centre) + shift, r.radius});
+    const std::vector<Asked> all = ranks.gather(asked_);
+    asked_.clear();
+    w.carves = all.size();
+    const std::vector<Vec3> shifts = ranks.image_shifts();
+    const double growth = law.front_growth();
+    const Fronts fronts(growth > 1 ? all : std::vector<Asked>(), shifts, law.front_reach());
+    for (const Asked& a : all) {
+      const double radius = a.by_load && fronts.hold(vec(a.centre)) ? growth * a.radius : a.radius;
+      for (const Vec3& shift : shifts) w.balls.push_back({vec(a.centre) + shift, radius});
     }
     w.bodies = ranks.gather(std::vector<int>(bodies_.begin(), bodies_.end()));
     bodies_.clear();
@@ -82,7 +85,36 @@ class WakeRequests {
   }
 
  private:
-  std::vector<Ball> balls_;
+  struct Asked {
+    Triple centre;
+    double radius;
+    bool by_load;
+  };
+  /// Where many wake beside each other by their loads.
+  class Fronts {
+   public:
+    Fronts(const std::vector<Asked>& all, const std::vector<Vec3>& shifts, double reach) : reach_(reach) {
+      std::vector<Sphere> places;
+      for (const Asked& a : all)
+        if (a.by_load)
+          for (const Vec3& shift : shifts) places.push_back({vec(a.centre) + shift, 0});
+      places_.build(std::move(places), reach_);
+    }
+    bool hold(const Vec3& x) const {
+      int near = -1;  // itself
+      const Vec3 reach = Vec3::Constant(reach_);
+      return !places_.for_each_in_box(x - reach, x + reach, [&](std::size_t, const Sphere& other) {
+        if ((other.centre - x).squaredNorm() < reach_ * reach_) ++near;
+        return near < WakeUpLaw::front_size;
+      });
+    }
+
+   private:
+    double reach_;
+    SphereCells places_;
+  };
+
+  std::vector<Asked> asked_;
   std::set<int> bodies_;  // keys
   bool all_ = false;
 };

@@ -14,6 +14,7 @@ struct WakeUpLaw {
   double gravity;                        ///< |g| in m/s^2
   double carve_radius;                   ///< r0 in m
   double carve_cap;                      ///< largest growth of r0
+  double diameter;                       ///< d in m
   static constexpr double growth = 0.5;  ///< c of the carve law
   static constexpr double direction_share = 1.0 / 120,
                           size_share = 1.0 / 12;  ///< for A = 1: 2.5 % and 25 % at the default tolerance
@@ -42,6 +43,14 @@ struct WakeUpLaw {
 
   /// Radius (m) of the ball that a waking granule carves: r0 (1 + c log2(excess)), at most cap r0. excess >= 1.
   double radius(double excess) const;
+
+  /// A granule that wakes beside this many others is in a front: a wave passes, or the support of many has gone. Balls around a
+  /// front run ahead of it: with an r0 of one diameter a wave would lose a tenth of what it does to the floor, and a bed would
+  /// fall late.
+  static constexpr int front_size = 3;
+  double front_reach() const { return 3 * diameter; }  ///< m: who is beside it
+  /// By how much balls are larger there: r0 is two diameters at least.
+  double front_growth() const { return std::max(1.0, 2 * diameter / carve_radius); }
 };
 
 }  // namespace solidcull
