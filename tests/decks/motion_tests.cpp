@@ -396,11 +396,13 @@ TEST(Motion, AMassThatLeavesTheBoxIsGoneAsItWouldBeWithoutTheFix) {
 TEST(Motion, ABodyThatLosesItsSupportFalls) {
   Bed bed;
   bed.name = "support";
-  double fallen[2];
-  for (const bool culled : {false, true}) {
+  std::vector<double> fallen;
+  // unculled, the default, a ball so small that only the law for fronts helps
+  for (const std::string carve : {"", "carve 2 4", "carve 1 4"}) {
+    const bool culled = !carve.empty();
     Engine e;
-    e.run(read_bed(bed) + "run 0\n" + (culled ? "fix cull all solid/cull exterior live every 50 calm 2 depth 1.5\n" : "") +
-          "run 500\n");
+    const std::string fix = culled ? "fix cull all solid/cull exterior live every 50 calm 2 depth 1.5 " + carve + "\n" : "";
+    e.run(read_bed(bed) + "run 0\n" + fix + "run 500\n");
     const auto height = [&] {
       double mass = culled ? e.vector("cull", 5) : 0, moment = culled ? mass * e.vector("cull", 22) : 0;
       for (const auto& g : e.state()) {
@@ -417,15 +419,17 @@ TEST(Motion, ABodyThatLosesItsSupportFalls) {
     if (culled) {
       EXPECT_GT(e.vector("cull", 7), 100) << "what rested on the floor wakes";
     }
-    fallen[culled] = before - height();
+    fallen.push_back(before - height());
   }
   const double seconds = 150 * dt, way = 0.5 * 9.81 * seconds * seconds;
   EXPECT_LT(fallen[0], way);
   EXPECT_GT(fallen[0], 0.7 * way) << "side walls hold back a little";
-  EXPECT_NEAR(fallen[1], fallen[0], 0.03 * fallen[0]);  // some steps go by before a granule is woken: 2 % were measured
+  for (const double way_of_culled : {fallen[1], fallen[2]})
+    EXPECT_NEAR(way_of_culled, fallen[0], 0.03 * fallen[0]);  // some steps go by before a granule is woken: 2 % were measured
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  if (rank == 0) std::printf("it fell %.4g of the way of a free fall, unculled %.4g\n", fallen[1] / way, fallen[0] / way);
+  if (rank == 0)
+    std::printf("it fell %.4g and %.4g of the way of a free fall, unculled %.4g\n", fallen[1] / way, fallen[2] / way, fallen[0] / way);
 }
 
 }  // namespace

@@ -164,13 +164,13 @@ TEST(Cover, an_interface_granule_that_loses_its_cover_asks_to_wake) {
   cube.parts.motion.refresh();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
-  const std::size_t after_one = cube.parts.wake.take(cube.world.ranks).balls.size();
+  const std::size_t after_one = cube.parts.wake.take(cube.world.ranks, cube.parts.scales.wake_up()).balls.size();
   cube.remove_above(5);  // the second: half a diameter is left
   cube.parts.motion.is_stale();
   cube.parts.motion.refresh();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
-  const Wakes wakes = cube.parts.wake.take(cube.world.ranks);
+  const Wakes wakes = cube.parts.wake.take(cube.world.ranks, cube.parts.scales.wake_up());
   EXPECT_LE(after_one, 9u);  // at most the topmost nine
   // now all nine of them, whoever else
   for (int i = 2; i < 5; ++i)

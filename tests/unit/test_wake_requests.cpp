@@ -1,10 +1,15 @@
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "small_world.h"
 #include "wake_requests.h"
 
 namespace solidcull {
 namespace {
+
+constexpr double d = 0.01;  // m
+const WakeUpLaw law{3.0, 0.0, 9.81, d, 4.0, d};
 
 SmallDeck box(std::array<int, 3> split) {
   SmallDeck deck;
@@ -25,7 +30,7 @@ TEST(WakeRequests, every_rank_gets_the_balls_and_bodies_of_all) {
       EXPECT_TRUE(wake.asks_body(7));
     }
     EXPECT_EQ(wake.any_here(), w.ranks.me != 1);
-    const Wakes all = wake.take(w.ranks);
+    const Wakes all = wake.take(w.ranks, law);
     EXPECT_EQ(all.carves, 2u);
     ASSERT_EQ(all.balls.size(), 2u);
     EXPECT_EQ(all.balls[0].radius, 0.01);
@@ -37,7 +42,7 @@ TEST(WakeRequests, every_rank_gets_the_balls_and_bodies_of_all) {
     // and they are empty afterwards
     EXPECT_FALSE(wake.any_here());
     EXPECT_FALSE(wake.asks_body(7));
-    EXPECT_TRUE(wake.take(w.ranks).none());
+    EXPECT_TRUE(wake.take(w.ranks, law).none());
   });
 }
 
@@ -47,7 +52,7 @@ TEST(WakeRequests, balls_have_their_periodic_images_which_count_as_no_carves) {
   run_on_ranks(deck, [](SmallWorld& w) {
     WakeRequests wake;
     if (w.ranks.me == 1) wake.ask(Vec3(0.99, 0.01, 1.5), 0.1);
-    const Wakes all = wake.take(w.ranks);
+    const Wakes all = wake.take(w.ranks, law);
     EXPECT_EQ(all.carves, 1u);
     EXPECT_EQ(all.balls.size(), 9u);
     EXPECT_TRUE(all.in_ball(Vec3(0.05, 1.98, 1.5), 0));  // through two sides
@@ -57,13 +62,48 @@ TEST(WakeRequests, balls_have_their_periodic_images_which_count_as_no_carves) {
   });
 }
 
+TEST(WakeRequests, balls_are_larger_where_many_wake_beside_each_other_on_whatever_rank) {
+  run_on_ranks(box({2, 1, 1}), [](SmallWorld& w) {
+    WakeRequests wake;
+    const Vec3 front(0.5, 1, 1);
+    if (w.ranks.me == 0) {
+      wake.ask_by_load(front, 0.011);
+      wake.ask_by_load(front - Vec3(2.5 * d, 0, 0), 0.012);
+      wake.ask_by_load(Vec3(0.1, 1, 1), 0.013);            // alone
+      for (int k = 0; k < 9; ++k) wake.ask(Vec3(0.1, 1, 1), d);  // not by their loads
+    } else {
+      wake.ask_by_load(front + Vec3(0, d, 0), 0.014);
+      wake.ask_by_load(front - Vec3(0, d, 0), 0.015);
+      wake.ask_by_load(front + Vec3(2.5 * d, 0, 0), 0.016);  // three are within 3 d, the fourth is not
+      wake.ask_by_load(front + Vec3(5 * d, 0, 0), 0.017);    // one is
+    }
+    std::map<double, double> larger;
+    for (const Ball& b : wake.take(w.ranks, law).balls)
+      for (const double asked : {d, 0.011, 0.012, 0.013, 0.014, 0.015, 0.016, 0.017})
+        if (b.radius == asked || b.radius == 2 * asked) larger[asked] = b.radius / asked;
+    const std::map<double, double> due = {{d, 1},     {0.011, 2}, {0.012, 2}, {0.013, 1},
+                                          {0.014, 2}, {0.015, 2}, {0.016, 2}, {0.017, 1}};
+    EXPECT_EQ(larger, due);
+  });
+}
+
+TEST(WakeRequests, a_front_goes_on_through_periodic_sides) {
+  SmallDeck deck = box({1, 1, 1});
+  deck.periodic = {true, false, false};
+  run_on_ranks(deck, [](SmallWorld& w) {
+    WakeRequests wake;
+    for (const double x : {0.002, 0.012, 0.988, 0.998}) wake.ask_by_load(Vec3(x, 1, 1), d);
+    for (const Ball& b : wake.take(w.ranks, law).balls) EXPECT_EQ(b.radius, 2 * d) << b.centre.transpose();
+  });
+}
+
 TEST(WakeRequests, all_is_for_all_ranks_whoever_asked) {
   run_on_ranks(box({2, 1, 1}), [](SmallWorld& w) {
     WakeRequests wake;
     if (w.ranks.me == 1) wake.ask_all();
     EXPECT_FALSE(wake.any_here());  // no granule, no body: no rebuild of its own
-    EXPECT_TRUE(wake.take(w.ranks).all);
-    EXPECT_FALSE(wake.take(w.ranks).all);
+    EXPECT_TRUE(wake.take(w.ranks, law).all);
+    EXPECT_FALSE(wake.take(w.ranks, law).all);
   });
 }
 

@@ -7,18 +7,18 @@
 namespace solidcull {
 namespace {
 
-constexpr double mass = 2.3e-5, g = 9.81, r0 = 5e-3;  // kg, m/s^2, m
-const WakeUpLaw law{3.0, 0.1, g, r0, 4.0};
+constexpr double mass = 2.3e-5, g = 9.81, d = 2.5e-3, r0 = 2 * d;  // kg, m/s^2, m
+const WakeUpLaw law{3.0, 0.1, g, r0, 4.0, d};
 
 TEST(WakeUpLaw, tolerance_is_absolute_plus_relative) {
   EXPECT_DOUBLE_EQ(law.tolerance(mass, 0.05), 3 * mass * g + 0.1 * 0.05);
-  const WakeUpLaw absolute{3.0, 0.0, g, r0, 4.0}, relative{0.0, 0.1, g, r0, 4.0};
+  const WakeUpLaw absolute{3.0, 0.0, g, r0, 4.0, d}, relative{0.0, 0.1, g, r0, 4.0, d};
   EXPECT_DOUBLE_EQ(absolute.tolerance(mass, 1e6), 3 * mass * g);
   EXPECT_DOUBLE_EQ(relative.tolerance(mass, 2.0), 0.2);
 }
 
 TEST(WakeUpLaw, who_bears_little_sleeps_through_half_of_that) {
-  const WakeUpLaw absolute{3.0, 0.0, g, r0, 4.0};
+  const WakeUpLaw absolute{3.0, 0.0, g, r0, 4.0, d};
   const double weight = mass * g;
   EXPECT_DOUBLE_EQ(absolute.tolerance(mass, 1.2 * weight), 0.6 * weight);  // its support goes: a change of a whole weight
   EXPECT_GT(absolute.excess(Vec3(0, 0, 0), Vec3(0, 0, weight), mass, 1.2 * weight), 1);
@@ -56,8 +56,17 @@ TEST(WakeUpLaw, the_carved_ball_is_capped) {
   EXPECT_DOUBLE_EQ(law.radius(65), 4 * r0);
   EXPECT_DOUBLE_EQ(law.radius(1e300), 4 * r0);
   EXPECT_DOUBLE_EQ(law.radius(HUGE_VAL), 4 * r0);
-  const WakeUpLaw no_growth{3.0, 0.0, g, r0, 1.0};
+  const WakeUpLaw no_growth{3.0, 0.0, g, r0, 1.0, d};
   EXPECT_DOUBLE_EQ(no_growth.radius(1000), r0);
+}
+
+TEST(WakeUpLaw, in_a_front_the_ball_of_two_diameters_is_the_least) {
+  const auto growth = [](double diameters) { return WakeUpLaw{3.0, 0.0, g, diameters * d, 4.0, d}.front_growth(); };
+  EXPECT_DOUBLE_EQ(growth(1), 2);
+  EXPECT_DOUBLE_EQ(growth(0.5), 4);
+  EXPECT_DOUBLE_EQ(growth(2), 1);
+  EXPECT_DOUBLE_EQ(growth(3), 1);
+  EXPECT_DOUBLE_EQ(law.front_reach(), 3 * d);
 }
 
 TEST(WakeUpLaw, the_carved_ball_never_shrinks_below_r0) {
@@ -66,7 +75,7 @@ TEST(WakeUpLaw, the_carved_ball_never_shrinks_below_r0) {
 }
 
 // A = 3: 25 % of |g| by size, 2.5 % by direction, for a body of some hundred granules or more
-const WakeUpLaw three_weights{3.0, 0.0, g, r0, 4.0};
+const WakeUpLaw three_weights{3.0, 0.0, g, r0, 4.0, d};
 constexpr double granules = 1000;
 const Vec3 down(0, 0, -g);
 
@@ -109,7 +118,7 @@ TEST(GravityChanged, by_size_and_direction_each_on_its_own) {
 }
 
 TEST(GravityChanged, by_shares_that_go_with_the_tolerance) {
-  const WakeUpLaw twice{6.0, 0.0, g, r0, 4.0}, relative{0.0, 0.1, g, r0, 4.0};
+  const WakeUpLaw twice{6.0, 0.0, g, r0, 4.0, d}, relative{0.0, 0.1, g, r0, 4.0, d};
   EXPECT_FALSE(twice.gravity_changed(1.499 * down, down, granules));
   EXPECT_TRUE(twice.gravity_changed(1.501 * down, down, granules));
   EXPECT_FALSE(twice.gravity_changed(down + Vec3(0.0499 * g, 0, 0), down, granules));
@@ -145,7 +154,7 @@ TEST(GravityChanged, from_none) {
     EXPECT_TRUE(gravity_changed(0.251 * g * direction, Vec3::Zero()));
   }
   EXPECT_TRUE(gravity_changed(down, Vec3::Zero()));
-  const WakeUpLaw weightless{3.0, 0.0, 0.0, r0, 4.0};
+  const WakeUpLaw weightless{3.0, 0.0, 0.0, r0, 4.0, d};
   EXPECT_FALSE(weightless.gravity_changed(Vec3::Zero(), Vec3::Zero(), granules));
   EXPECT_TRUE(weightless.gravity_changed(Vec3(0, 0, -1e-3), Vec3::Zero(), granules));
 }
