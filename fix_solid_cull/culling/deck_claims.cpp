@@ -13,7 +13,7 @@ int DeckClaims::wake_claimed() {
     groups_of_stored |= groups;
     if (!atoms.groups_may_be_culled(groups)) asking.push_back(solid_.bodies().pose(g.body).to_world(g.position));
   });
-  wake_.ask_many(ports_.ranks, asking, scales_.wake_up().radius(1) * scales_.wake_up().front_growth(), solid_.locked());
+  wake_.ask_many(ports_.ranks, asking, scales_.wake_up(), solid_.locked());
   return groups_of_stored;
 }
 

@@ -105,7 +105,7 @@ void ShownBed::hide() {
   for (const int i : guests) atoms.take_out(i);
 
   changed_ = ports_.ranks.any(!changes_.empty());
-  wake_.ask_many(ports_.ranks, asking_, scales_.wake_up().radius(1) * scales_.wake_up().front_growth(), solid_.locked());
+  wake_.ask_many(ports_.ranks, asking_, scales_.wake_up(), solid_.locked());
   shown_ = false;
   if (granules_.capacity() < worth_freeing) return;
   names_ = {};

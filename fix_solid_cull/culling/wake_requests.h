@@ -45,9 +45,9 @@ class WakeRequests {
   void ask_by_load(const Vec3& centre, double radius) { asked_.push_back({triple(centre), radius, true}); }
   void ask_body(int key) { bodies_.insert(key); }
   void ask_all() { all_ = true; }
-  /// A ball around each place. Where these are a large share of the granules that are locked, `locked` on this rank, or would
-  /// take long to compare with them, all wakes. Collective.
-  void ask_many(const Ranks& ranks, const std::vector<Vec3>& places, double radius, std::size_t locked) {
+  /// A ball around each place, as large as in a front: what touches it wakes too. Where these are a large share of the granules
+  /// that are locked, `locked` on this rank, or would take long to compare with them, all wakes. Collective.
+  void ask_many(const Ranks& ranks, const std::vector<Vec3>& places, const WakeUpLaw& law, std::size_t locked) {
     constexpr double most = 0.25;             // of all that is locked
     constexpr double most_comparisons = 2e8;  // of granules that wake with granules that may
     std::int64_t counts[2] = {static_cast<std::int64_t>(places.size()), static_cast<std::int64_t>(locked)};
@@ -56,7 +56,7 @@ class WakeRequests {
     if (asking > most * all || asking * all > most_comparisons) {
       if (asking > 0) ask_all();
     } else {
-      for (const Vec3& place : places) ask(place, radius);
+      for (const Vec3& place : places) ask(place, law.radius(1) * law.front_growth());
     }
   }
 
@@ -70,7 +70,7 @@ class WakeRequests {
     const std::vector<Asked> all = ranks.gather(asked_);
     asked_.clear();
     w.carves = all.size();
-    const std::vector<Vec3> shifts = ranks.image_shifts();
+    const std::vector<Vec3>& shifts = ranks.image_shifts();
     const double growth = law.front_growth();
     const Fronts fronts(growth > 1 ? all : std::vector<Asked>(), shifts, law.front_reach());
     for (const Asked& a : all) {

@@ -87,6 +87,19 @@ TEST(WakeRequests, balls_are_larger_where_many_wake_beside_each_other_on_whateve
   });
 }
 
+TEST(WakeRequests, who_asks_for_many_wakes_what_touches_them) {
+  run_on_ranks(box({1, 1, 1}), [](SmallWorld& w) {
+    WakeRequests wake;
+    wake.ask_many(w.ranks, {Vec3(0.5, 1, 1)}, law, 100);
+    const Wakes wakes = wake.take(w.ranks, law);
+    EXPECT_FALSE(wakes.all);
+    EXPECT_TRUE(wakes.in_ball(Vec3(0.5 + 1.2 * d, 1, 1), 0));
+    EXPECT_FALSE(wakes.in_ball(Vec3(0.5 + 2.1 * d, 1, 1), 0));
+    wake.ask_many(w.ranks, {Vec3(0.5, 1, 1)}, law, 3);
+    EXPECT_TRUE(wake.take(w.ranks, law).all) << "a third of what is locked";
+  });
+}
+
 TEST(WakeRequests, a_front_goes_on_through_periodic_sides) {
   SmallDeck deck = box({1, 1, 1});
   deck.periodic = {true, false, false};
