@@ -108,6 +108,7 @@ void Culling::set_up_atoms() {
   open_for_insertion();
   change();
   p_.closure.run_has_begun();
+  walls_are_felt_ = !other_walls;
 }
 
 void Culling::is_set_up() {
@@ -209,12 +210,22 @@ void Culling::take_forces() {
   }
   if (p_.census.something_locked() || !loads_are_none_) take_loads();
   loads_are_none_ = !p_.census.something_locked();
+  store_what_feels_walls();
   collect_wakes();
   if (p_.pacing.due(step)) {
     look();
     if (p_.ports.ranks.any(p_.wake.any_here())) ask_for_build(step + 1);
   }
   if (p_.census.something_stored()) open_for_insertion();
+}
+
+/// What came out of the store because walls may be others feels them now, and goes back: there may be very many, and a look is
+/// some steps away.
+void Culling::store_what_feels_walls() {
+  if (walls_are_felt_) return;
+  walls_are_felt_ = true;
+  const bool asked = p_.scales.sleeping() && p_.closure.ask_to_store(p_.motion.interface_atoms());
+  if (p_.ports.ranks.any(asked)) ask_for_build(p_.ports.run.step + 1);
 }
 
 /// Gentle loads wait for each other; a blow does not.

@@ -90,6 +90,7 @@ class Culling {
   void refuse_what_lies_too_far() const;
   void see_walls(bool new_run);
   void take_loads();
+  void store_what_feels_walls();
   void collect_wakes();
   void look();
   void look_at_once();
@@ -118,6 +119,7 @@ class Culling {
   std::int64_t restored_then_ = 0;   // granules restored on this rank until culling was judged last
   bool surface_drawn_ = false;       // at the last look
   bool loads_are_none_ = false;      // nothing was culled when they were taken last
+  bool walls_are_felt_ = true;       // since the run began, by what stands at them
 };
 
 }  // namespace solidcull

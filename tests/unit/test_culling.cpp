@@ -214,6 +214,33 @@ TEST(Culling, a_run_that_begins_with_an_empty_box_takes_its_scales_from_the_firs
   EXPECT_GT(culling.value(interior), 0);
 }
 
+/// Where walls may be others, what stands at them comes out of the store to feel them, and goes back after one step: a look is
+/// farther away.
+TEST(Culling, what_came_out_to_feel_its_walls_goes_back_before_the_next_look) {
+  SmallWorld world(Column::deck());
+  Culling culling(world.ports(), sleeping_settings(), 1);
+  constexpr int side = 5, high = 2;
+  const double weight = 9.81 * world.mass_of(r);
+  for (int n = 0; n < side * side; ++n)
+    for (int k = 0; k < high; ++k)
+      world.add(n * high + k + 1,
+                Vec3(3 * r * (n % side - 2) + 0.001, 3 * r * (n / side - 2) + 0.002,
+                     r + 2 * r * k - (k ? 2 * high - 1 : high) * weight / world.deck.stiffness),
+                r);
+  world.follow(culling);
+  world.begin_run(&culling);
+  world.steps(&culling, 200);
+  ASSERT_GE(culling.value(interior), 45);
+  culling.end_run();
+  world.deck.planes = {SmallDeck::ground(-0.1)};  // far below: it touches nothing
+  world.begin_run(&culling);
+  ASSERT_GE(culling.value(interface_granules), side * side);
+  world.steps(&culling, 2);
+  EXPECT_GE(culling.value(interior), 45);
+  world.steps(&culling, 2);
+  EXPECT_NEAR(world.walls.borne_by_meshes()[2], -side * side * high * weight, 1e-3 * weight);
+}
+
 TEST(Culling, the_engines_arrays_are_cut_with_what_follows_them) {
   SmallWorld world(Column::deck());
   Column column(world);
