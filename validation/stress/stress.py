@@ -430,7 +430,7 @@ def tap():
     """A granule is pressed down at one place, again and again."""
     bed, n = soft_bed()
     steps = effort.of(60_000, 200_000, 500)
-    return [Part("tap", "tap.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "rows": effort.of(50, 200, 50),
+    return [Part("tap", "tap.in", {"restart": bed, "L": BOX[0], "W": BOX[1], "steps": steps, "rows": effort.of(20, 20, 50),  # at every phase of a press
                                    "before": effort.of(2000, 2000, 50)}, n + 1, steps, more=carves_thousands)]
 
 
@@ -518,7 +518,7 @@ def row(part, figures):
     for kind, f in figures.items():
         state = "stopped" if f["failure"] else "unstable" if not f["stable"] else "stable"
         lines.append(f"{part.name:22} {kind:9} {state:9} peak {f['peak']:9.3g}  end {f['late']:9.3g} M g d  fastest {f['fastest']:8.3g} m/s"
-                     + (f" of {', '.join(f'{e:.1e}' for e in f['late_of_each'])}" if len(f["late_of_each"]) > 1 else "")
+                     + (f"  median end of {', '.join(f'{e:.1e}' for e in f['late_of_each'])}" if len(f["late_of_each"]) > 1 else "")
                      + (f"  culled {f['most_culled']:5.0f}  restored {f['restored']:8.0f}  carves {f['carves']:7.0f}" if kind != "unculled" else ""))
     return "\n".join(lines)
 
