@@ -307,16 +307,6 @@ class StressBars(unittest.TestCase):
         self.part.once = True
         self.assertEqual(self.part.unculled_runs(), 1)
 
-    def test_of_three_culled_runs_the_median_of_their_late_energies_counts(self):
-        for each, missed in (([1.1, 0.5, 0.6], []), ([1.1, 0.5, 1.3], ["live"]), ([1.1], ["live"]), ([0.9], [])):
-            runs = [self.figures(late=late) for late in each]
-            self.stress.take_median(runs)
-            checks = [c for k, f in enumerate(runs) for c in self.stress.of_stable(
-                f"made-up, live{f'-{k + 1}' if k else ''}: ", self.part, f, types.SimpleNamespace(final=self.end), [self.figures()],
-                types.SimpleNamespace(final=self.end), 3.0)]
-            self.assertEqual(self.stress.missed_late(checks), missed, each)
-            self.assertEqual(runs[0].late_of_each, each)
-
     def test_mechanical_energy(self):
         columns = "mass radius x y z vx vy vz omegax omegay omegaz".split()
         r, m, depth = 0.01, 2.0, 1e-4

@@ -12,7 +12,6 @@ import argparse
 import hashlib
 import json
 import math
-import statistics
 import sys
 import time
 from dataclasses import dataclass, field
@@ -35,8 +34,6 @@ STILL = 1e-9           # M g d: kinetic energy of a bed that was at rest from th
 CALMED = 1e-4          # M g d: of one that has come to rest again; a bed that ends with more, its time step at the limit, is unstable
 PEAK, FASTEST, LATE = 1.1, 1.5, 2.0  # culled over unculled: largest kinetic energy, largest speed, kinetic energy at the end
 SCATTERED = 8          # unculled runs where one ball that rolls to and fro has all the energy at the end: README.md says why so many
-AGAIN = 2              # culled runs more, where the first has too much energy at its end: then the median of the three counts
-LATE_ENERGY = "kinetic energy, last tenth (M g d)"
 SURE = 0.25            # of the Rayleigh time: a run with such steps or smaller ones has to be stable
 SETTLED = 0.2          # of the Rayleigh time: the time step until a bed is culled
 FEW_KEYWORDS = "depth 0.25 voxel 0.125 every 20 calm 1 speed 0.1"  # so that a small bed locks granules within few steps
@@ -156,27 +153,24 @@ class StressJob(twins.KeptJob):
         return run
 
 
-def run_part(part, say, again=()):
-    """The runs of a part, by kind: a list of them. `again`: kinds that are run AGAIN times more, 1e-5 d apart."""
+def run_part(part, say):
+    """The runs of a part, by kind: a list of them."""
     launcher = engine.find_launcher()
     sources = "".join(f.read_text() for f in [*SHARED, *(HERE / f"{name}.in" for name in ("start", "defaults", "computes", "dry", "sticky"))])
     bed = beds.recipe_of(HERE / part.variables["restart"]) if "restart" in part.variables else ""
     jobs = []
-    wanted = [("unculled", f"unculled-{k + 1}", k) for k in range(part.unculled_runs())]
-    wanted += [(kind, f"{kind}-{k + 1}" if k else kind, k) for kind in KINDS for k in range(1 + AGAIN * (kind in again))]
-    for of_kind, name, k in wanted:
-        keywords = KINDS.get(of_kind)
+    for k, (name, keywords) in enumerate([(f"unculled-{k + 1}", None) for k in range(part.unculled_runs())] + list(KINDS.items())):
         kind = "culled" if keywords else "unculled"
         variables = {"start_dump": (part.out() / "start.dump").relative_to(HERE), "folder": part.out().relative_to(HERE), **part.variables,
                      **(part.alone if not keywords else {})}
         if keywords:
             few_keywords = FEW_KEYWORDS if effort.kind == "few" and part.deck != "heavy.in" else ""
-            keywords = " ".join(filter(None, (keywords, part.keywords, part.asleep if of_kind == "sleep" else "", few_keywords)))
+            keywords = " ".join(filter(None, (keywords, part.keywords, part.asleep if name == "sleep" else "", few_keywords)))
         made_with = hashlib.sha1((sources + bed + (engine.hash_of_fix(launcher) if keywords else "")).encode()).hexdigest()
-        jobs.append(StressJob(HERE / part.deck, part.out(), kind, k, variables, launcher=launcher, keywords=keywords, name=name,
+        jobs.append(StressJob(HERE / part.deck, part.out(), kind, 0 if keywords else k, variables, launcher=launcher, keywords=keywords, name=name,
                               made_with=made_with))
     runs = twins.run_jobs(jobs, say=say, steps=part.steps)
-    return {of_kind: [run for (kind, _, _), run in zip(wanted, runs) if kind == of_kind] for of_kind in ("unculled", *KINDS)}
+    return {"unculled": [run for job, run in zip(jobs, runs) if job.kind == "unculled"], **{run.name: [run] for run in runs if run.name in KINDS}}
 
 
 # --- what is held against what --------------------------------------------------------------------------------------
@@ -205,7 +199,6 @@ class Figures:
         self.carves = float(run.series("f_cull[8]")[1].max()) if culled else 0.0
         self.most_culled = float((run.series("f_cull[2]")[1] + run.series("f_cull[3]")[1]).max()) if culled else 0.0
         self.added = float(run.series("f_cull[12]")[1].max()) if culled else 0.0  # J
-        self.late_of_each = [self.late]
 
     def stable(self):
         return not self.failure and self.finite and not (self.at_limit and self.late > CALMED)
@@ -221,18 +214,6 @@ def sum_of(run, *columns):
     return sum(run.series(whole if run.counts is not None else of_atoms)[1] for whole, of_atoms in columns)
 
 
-def take_median(figures):
-    """Of culled runs of one kind: what each had at its end, and as its late energy the median of them."""
-    each = [f.late for f in figures]
-    for f in figures:
-        f.late, f.late_of_each = statistics.median(each), each
-
-
-def missed_late(checks):
-    """Kinds of which a culled run has more energy at its end than it may."""
-    return [kind for kind in KINDS if any(not c["good"] and f", {kind}: {LATE_ENERGY}" in c["what"] for c in checks)]
-
-
 def unit_of(part, granules):
     """M g d (J); `granules`: of a run's end, None if none got there."""
     mass = part.granules * DENSITY * math.pi / 6 * part.diameter**3 if granules is None else float(granules["mass"].sum())
@@ -245,8 +226,6 @@ def judge(part, runs):
     unit = unit_of(part, finals[0] if finals else None)
     figures = {kind: [Figures(part, run, unit, part.granules) for run in of_kind] for kind, of_kind in runs.items()}
     unculled = figures["unculled"]
-    for kind in KINDS:
-        take_median(figures[kind])
     for f in unculled:
         if (f.failure or not f.finite) and not (part.at_limit and effort.kind != "few"):
             raise errors.RunError(f"{part.name}: {f.failure or 'the unculled run has figures that are no numbers'}")
@@ -254,9 +233,8 @@ def judge(part, runs):
     checks = []
     for kind in KINDS:
         of_run = of_stable if stable else of_unstable
-        for f, run in zip(figures[kind], runs[kind]):
-            checks += of_run(f"{part.name}, {run.name}: ", part, f, run, unculled, runs["unculled"][0], unit)
-    if stable and part.more and not any(f.failure for kind in KINDS for f in figures[kind]):
+        checks += of_run(f"{part.name}, {kind}: ", part, figures[kind][0], runs[kind][0], unculled, runs["unculled"][0], unit)
+    if stable and part.more and not any(figures[kind][0].failure for kind in KINDS):
         checks += part.more(part, runs, unit / part.granules)
     if effort.kind == "few":
         few_steps.check({"unculled": runs["unculled"], "culled": runs["live"] + runs["sleep"]}, part.granules, part.steps,
@@ -290,7 +268,7 @@ def of_stable(what, part, c, run, unculled, beside, unit):
     return checks + [
         check(what + "granules lost", c.lost, lost, c.lost <= lost and whole),
         check(what + "kinetic energy, largest (M g d)", c.peak, max(PEAK * largest("peak"), part.calm)),
-        check(what + LATE_ENERGY, c.late, max(LATE * largest("late"), part.calm)),
+        check(what + "kinetic energy, last tenth (M g d)", c.late, max(LATE * largest("late"), part.calm)),
         check(what + "largest speed (m/s)", c.fastest, max(FASTEST * largest("fastest"), slow)),
         check(what + "energy added, of m g d per granule restored", c.added * part.granules / unit / max(c.restored, 1), INJECTED)]
 
@@ -518,7 +496,6 @@ def row(part, figures):
     for kind, f in figures.items():
         state = "stopped" if f["failure"] else "unstable" if not f["stable"] else "stable"
         lines.append(f"{part.name:22} {kind:9} {state:9} peak {f['peak']:9.3g}  end {f['late']:9.3g} M g d  fastest {f['fastest']:8.3g} m/s"
-                     + (f"  median end of {', '.join(f'{e:.1e}' for e in f['late_of_each'])}" if len(f["late_of_each"]) > 1 else "")
                      + (f"  culled {f['most_culled']:5.0f}  restored {f['restored']:8.0f}  carves {f['carves']:7.0f}" if kind != "unculled" else ""))
     return "\n".join(lines)
 
@@ -551,10 +528,6 @@ def main(argv=None):
             started = time.monotonic()
             runs = run_part(part, lambda line: print(f"  {part.name}: {line}", flush=True))
             of_part, figures = judge(part, runs)
-            again = missed_late(of_part) if effort.kind != "few" else []
-            if again:
-                runs = run_part(part, lambda line: print(f"  {part.name}, again: {line}", flush=True), again)
-                of_part, figures = judge(part, runs)
             checks += of_part
             report[part.name] = figures
             spent += sum(run.cpu for of_kind in runs.values() for run in of_kind)
