@@ -296,6 +296,17 @@ class StressBars(unittest.TestCase):
             check, = self.stress.of_unstable("", self.part, self.figures(failure=failure), None, None, None, 1.0)
             self.assertEqual(check["good"], good, failure)
 
+    def test_many_unculled_runs_where_the_late_energy_scatters(self):
+        self.assertEqual(self.part.unculled_runs(), 3)
+        self.stress.settled = lambda name, **how: name + ".restart"
+        for kind, runs in (("quick", 3), ("full", 8), ("few", 1)):
+            self.stress.effort.kind = kind
+            parts = self.stress.ratio()
+            self.assertEqual({part.unculled_runs() for part in parts}, {runs}, kind)
+            self.assertEqual(parts[0].work(), parts[0].granules * parts[0].steps * (runs + 2))
+        self.part.once = True
+        self.assertEqual(self.part.unculled_runs(), 1)
+
     def test_mechanical_energy(self):
         columns = "mass radius x y z vx vy vz omegax omegay omegaz".split()
         r, m, depth = 0.01, 2.0, 1e-4
