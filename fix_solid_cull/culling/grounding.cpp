@@ -139,7 +139,8 @@ void Grounding::share_out_loads() {
 // ------------------------------------------------------------------------------------------------------------ a step
 
 void Grounding::press_on_walls() {
-  for (const auto& [place, e] : solid_.wall_loads().of_all()) ports_.walls.press(place.first, place.second, -e.force, -e.torque);
+  for (const auto& [place, force, torque] : solid_.wall_loads().on_meshes())
+    ports_.walls.press(place.first, place.second, -force, -torque);
   // a body that stands still in spite of a load hands it on to the walls that hold it
   for (const ActiveBody& a : motion_.active()) {
     if (!a.stands) continue;

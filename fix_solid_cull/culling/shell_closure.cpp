@@ -346,10 +346,10 @@ class ShellClosure::Surroundings {
 
  private:
   struct Extent {
-    int key;
     Vec3 lo, hi;
   };
-  /// The largest body is everywhere: it asks whether it is near one of the others.
+  /// The largest body is everywhere: it asks whether it is near one of the others. Of these there may be thousands of few
+  /// granules.
   void find_others() {
     const SolidBodies& bodies = c_.solid_.bodies();
     std::size_t most = 0;
@@ -357,13 +357,18 @@ class ShellClosure::Surroundings {
       if (static_cast<std::size_t>(body.mass.count) > most)
         most = static_cast<std::size_t>(body.mass.count), largest_ = c_.groups_.key_of(number);
     const GranuleStore& store = c_.solid_.store();
+    std::vector<Sphere> small;
     store.for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
       if (c_.groups_.key_of(body) == largest_) return;
       const Pose& pose = bodies.pose(body);
       const Vec3 half = turned_half_box(pose.turn(), 0.5 * (hi - lo)) + Vec3::Constant(store.largest_radius());
       const Vec3 middle = pose.to_world(0.5 * (lo + hi));
-      others_.push_back({c_.groups_.key_of(body), middle - half, middle + half});
+      if (half.norm() < c_.scales_.diameter())
+        small.push_back({middle, half.norm()});  // it holds their spheres
+      else
+        others_.push_back({middle - half, middle + half});
     });
+    small_others_.build(std::move(small), 2 * c_.scales_.diameter());
   }
   bool is_open(const Vec3& x) const {
     return std::any_of(opened_.begin(), opened_.end(), [&](const Box& box) {
@@ -385,7 +390,8 @@ class ShellClosure::Surroundings {
       return true;
     const double reach = s.radius + gap_;
     const bool images = c_.ports_.ranks.image_shifts().size() > 1;
-    if (self.body == largest_ && !images && std::none_of(others_.begin(), others_.end(), [&](const Extent& e) {
+    if (self.body == largest_ && !images && !small_others_.any_near(s, gap_) &&
+        std::none_of(others_.begin(), others_.end(), [&](const Extent& e) {
           return (s.centre.array() > e.lo.array() - reach).all() && (s.centre.array() < e.hi.array() + reach).all();
         }))
       return false;
@@ -403,6 +409,7 @@ class ShellClosure::Surroundings {
   const double gap_;
   SphereCells exterior_, shells_;
   std::vector<Foreign> of_shell_;
+  SphereCells small_others_;  // around bodies of few stored granules
   std::vector<Extent> others_;
   int largest_ = 0;
   std::vector<Box> opened_;

@@ -10,6 +10,7 @@ void FrozenWallLoads::book(int body, const WallLoad& load, int sign) {
   book(elements, load, sign);
   if (elements.empty()) bodies_.erase(body);
   book(all_, load, sign);
+  on_meshes_known_ = false;
 }
 
 void FrozenWallLoads::book(Elements& elements, const WallLoad& load, int sign) {
@@ -79,6 +80,15 @@ Vec3 FrozenWallLoads::force(int body) const {
   if (found != bodies_.end())
     for (const auto& e : found->second) sum += e.second.force;
   return sum;
+}
+
+auto FrozenWallLoads::on_meshes() const -> const std::vector<OnMesh>& {
+  if (on_meshes_known_) return on_meshes_;
+  on_meshes_.clear();
+  for (const auto& [place, e] : all_)
+    if (place.first != WallLoad::no_mesh) on_meshes_.push_back({place, e.force, e.torque});
+  on_meshes_known_ = true;
+  return on_meshes_;
 }
 
 double FrozenWallLoads::weigh(int body, const Vec3& load) {

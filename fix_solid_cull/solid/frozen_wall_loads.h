@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "flat_map.h"
@@ -63,6 +64,12 @@ class FrozenWallLoads {
   }
   /// Summed over all bodies; without shares.
   const Elements& of_all() const { return all_; }
+  struct OnMesh {
+    Place place;
+    Vec3 force, torque;  ///< on the granules, summed over all bodies
+  };
+  /// The same of meshes alone, in one row: each step asks for it. Valid until something changes.
+  const std::vector<OnMesh>& on_meshes() const;
   std::size_t memory_bytes() const;
 
  private:
@@ -75,7 +82,9 @@ class FrozenWallLoads {
   static void book(Elements& elements, const WallLoad& load, int sign);
 
   std::map<int, Elements> bodies_;
-  Elements all_;        // what a step asks for must not go with the number of bodies
+  Elements all_;  // what a step asks for must not go with the number of bodies
+  mutable std::vector<OnMesh> on_meshes_;
+  mutable bool on_meshes_known_ = false;
   FlatMap<int> heads_;  // tag -> first entry
   std::vector<Entry> entries_;
   int free_ = none;

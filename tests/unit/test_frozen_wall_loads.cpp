@@ -44,6 +44,15 @@ std::map<Key, Element> listed(const FrozenWallLoads& loads) {
     EXPECT_EQ(loads.of_all().at(place).granules, sum.first);
     EXPECT_LE((loads.of_all().at(place).force - sum.second).norm(), 1e-9 * (1 + sum.second.norm()));
   }
+  std::size_t on_meshes = 0;
+  for (const auto& [place, e] : loads.of_all()) {
+    if (place.first == WallLoad::no_mesh) continue;
+    const FrozenWallLoads::OnMesh& row = loads.on_meshes().at(on_meshes++);
+    EXPECT_EQ(row.place, place);
+    EXPECT_EQ(row.force, e.force);
+    EXPECT_EQ(row.torque, e.torque);
+  }
+  EXPECT_EQ(loads.on_meshes().size(), on_meshes);
   return all;
 }
 
@@ -81,6 +90,16 @@ TEST(FrozenWallLoads, a_granule_without_loads_leaves_nothing_behind) {
   loads.add(7, 1, {});
   EXPECT_TRUE(loads.empty());
   EXPECT_FALSE(loads.holds(1));
+}
+
+TEST(FrozenWallLoads, of_walls_that_report_no_load_nothing_is_pressed_on) {
+  FrozenWallLoads loads;
+  loads.add(7, 1, {load(WallLoad::no_mesh, 4, {1, 0, 0}), up(3, 2)});
+  EXPECT_EQ(listed(loads).size(), 2u);
+  ASSERT_EQ(loads.on_meshes().size(), 1u);
+  EXPECT_EQ(loads.on_meshes()[0].place, FrozenWallLoads::Place(0, 3));
+  loads.erase(7, 1);
+  EXPECT_TRUE(loads.on_meshes().empty());
 }
 
 TEST(FrozenWallLoads, an_element_bears_the_sum_of_its_granules) {
