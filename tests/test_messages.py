@@ -1,5 +1,7 @@
 """What a user reads: each refusal by its text, in tiny decks through the launcher; and that the plug-in changes nothing unasked."""
+import contextlib
 import os
+import pty
 import re
 import shutil
 import subprocess
@@ -460,6 +462,70 @@ class Breakdowns(Case):
         for exterior in ("live depth 1", "sleep"):
             for ranks in (1, 2):
                 self.lost(lines, CULL_BLOCK.replace("live depth 1", exterior), ranks)
+
+
+@unittest.skipUnless(shutil.which("c++"), "no C++ compiler here")
+class NothingAfterAnError(Case):
+    """Where `rand` says so, the stock engine prints random characters after an error: one in five. Here `rand` always says so."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="solidcull-")
+        cls.addClassCleanup(folder.cleanup)
+        cls.dice = Path(folder.name) / "libdice.so"
+        subprocess.run(["c++", "-shared", "-fPIC", "-x", "c++", "-", "-o", cls.dice], input='extern "C" int rand() { return 0; }\n',
+                       text=True, check=True)
+
+    def both(self, text, program=None, plugin=None):
+        """What screen and log end with, from the error on."""
+        run = Run(text, program=program, preload=f"{plugin}:{self.dice}" if plugin else self.dice)
+        self.assertNotEqual(run.status, 0, run.output[-2000:])
+        return ["".join(told.partition("ERROR: ")[1:]) for told in (run.screen, run.log)]
+
+    def one_line(self, text, error, **how):
+        for told in self.both(text, **how):
+            self.assertRegex(told, rf"\AERROR: {error} \(\S+:\d+\)\n\Z")
+
+    @staticmethod
+    def all_of(reader):
+        told = b""
+        with contextlib.closing(os.fdopen(reader, "rb", buffering=0)) as terminal, contextlib.suppress(OSError):  # which is its end
+            while more := terminal.read(4096):
+                told += more
+        return told
+
+    def test_an_error_of_the_line(self):
+        self.one_line(deck(FIX + " depth 99"), "fix cull solid/cull: keyword 'depth' has the value '99': .*")
+        self.one_line(deck("region solid interface/mesh gone"), "region interface/mesh: 'gone' is no fix solid/cull: .*")
+
+    def test_errors_of_liggghts(self):
+        for line, error in (("no_such_command", "Unknown command: no_such_command"),
+                            ("fix side all wall/gran model hertz primitive type 1 xplane 0 oops", r"Fix wall/gran \(id side\): .*"),
+                            ("compute near all coord/atom", r"Compute coord/atom \(id near\): .*")):
+            with self.subTest(line):
+                self.one_line(deck(line), error)
+                self.one_line(deck(FIX, line), error)
+
+    @unittest.skipUnless(STOCK and engine_of(STOCK) == engine_of(LAUNCHER), "no stock liggghts here with the library of this build")
+    def test_the_stock_engine_has_the_second_line_and_with_the_library_has_not(self):
+        for told in self.both(deck("no_such_command"), program=STOCK):
+            self.assertGreater(told.count("\n"), 1, told)
+        self.one_line(deck("no_such_command"), "Unknown command: no_such_command", program=STOCK, plugin=LIBRARY)
+
+    def test_errors_of_one_rank_and_of_the_command_line(self):
+        for words, error in ((("-in", "deck.in"), "ERROR on proc 0: Cannot open input script gone"), (("-oops",), "ERROR: Invalid command-line"),
+                             (("-reorder", "custom", "gone"), "ERROR on proc 0: Cannot open -reorder file")):
+            with self.subTest(error), tempfile.TemporaryDirectory(prefix="solidcull-") as folder:
+                (Path(folder) / "deck.in").write_text("include gone\n")
+                env = {**engine.environment(1), "LD_PRELOAD": str(self.dice)}
+                # what goes to a file is lost when a rank ends all
+                reader, terminal = pty.openpty()
+                done = subprocess.run([LAUNCHER, *words], cwd=folder, env=env, timeout=TIME_LIMIT, stdout=terminal,
+                                      stderr=subprocess.DEVNULL, check=False)
+                os.close(terminal)
+                told = self.all_of(reader).decode(errors="replace").replace("\r", "")
+                self.assertNotEqual(done.returncode, 0, told)
+                self.assertRegex(told, rf"(?m)^{error}.*\(\S+:\d+\)\n\Z")
 
 
 class FixLineAgain(Case):

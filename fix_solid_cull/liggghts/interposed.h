@@ -1,6 +1,7 @@
 // The engine's functions that this library puts its own in place of: it comes first in the search for symbols, and asks for the
-// next. This is the one list of them. An interposer finds the engine's own function through it; the fix refuses an engine whose
-// calls do not arrive here (interpositions.h); and engine.cmake reads the symbols when an engine is chosen.
+// next. This is the one list of those that a run rests on. An interposer finds the engine's own function through it; the fix
+// refuses an engine whose calls do not arrive here (interpositions.h); and engine.cmake reads the symbols when an engine is
+// chosen.
 #pragma once
 
 #include <stdexcept>
