@@ -56,6 +56,22 @@ class PackedRows {
       if (i < count && !bit(shape.key.mask, i)) row[i] = row[from];
   }
 
+  /// The words from `first` to before `last`, given word 0.
+  void get_some(Place p, std::uint64_t word_0, int first, int last, std::uint64_t* out) const {
+    const Shape& shape = shapes_[p.shape];
+    const std::uint64_t* blob = shape.words ? pools_[shape.words].rows.row(p.blob) : nullptr;
+    if (shape.key.pattern == none) {
+      for (int i = first; i < last; ++i) out[i - first] = i == 0 ? word_0 : blob[i - 1];
+      return;
+    }
+    const Mask& mask = shape.key.mask;
+    const Pattern& pattern = patterns_[shape.key.pattern];
+    blob += bits_below(mask, first);
+    for (int i = first; i < last; ++i) out[i - first] = bit(mask, i) ? *blob++ : i == 0 ? word_0 : pattern.words[i];
+    for (const auto& [i, from] : pattern.repeats)
+      if (i >= first && i < last && !bit(mask, i)) get_some(p, word_0, from, from + 1, out + (i - first));
+  }
+
   /// Word 1, without a look at the blob where the pattern has it.
   std::uint64_t word_1(Place p) const {
     const Shape& shape = shapes_[p.shape];
@@ -137,6 +153,11 @@ class PackedRows {
   };
 
   static bool bit(const Mask& m, int i) { return m[i >> 6] >> (i & 63) & 1; }
+  static int bits_below(const Mask& m, int i) {
+    int n = 0;
+    for (int w = 0; w < i >> 6; ++w) n += __builtin_popcountll(m[w]);
+    return i & 63 ? n + __builtin_popcountll(m[i >> 6] & ((std::uint64_t{1} << (i & 63)) - 1)) : n;
+  }
   static int bits(const Mask& m) {
     int n = 0;
     for (const std::uint64_t w : m) n += __builtin_popcountll(w);

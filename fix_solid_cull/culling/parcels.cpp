@@ -214,20 +214,60 @@ void Parcels::begin_as_it_was(const Sender& sender) {
 }
 
 void Parcels::take_as_it_was(const Parcel& p) {
-  for (const Parcel::Granule& g : p.granules) {
+  // each contact goes in with the later of its two granules
+  const std::size_t n = p.granules.size();
+  FlatMap<int> order;
+  order.reserve(n);
+  for (std::size_t k = 0; k < n; ++k)
+    if (p.granules[k].record) order[p.granules[k].tag] = static_cast<int>(k);
+  struct Turn {
+    int granule, partner;  // in the parcel, -1 for one that is not in it, or not stored
+    const Parcel::Edge* edge;
+  };
+  std::vector<Turn> turns;
+  turns.reserve(p.edges.size());
+  std::vector<const Parcel::Edge*> of_others;
+  for (const Parcel::Edge& e : p.edges) {
+    const int *low = order.find(e.low), *high = order.find(e.high);
+    const int a = low ? *low : -1, b = high ? *high : -1;
+    if (a < 0 && b < 0)
+      of_others.push_back(&e);
+    else
+      turns.push_back({std::max(a, b), std::min(a, b), &e});
+  }
+  std::stable_sort(turns.begin(), turns.end(), [](const Turn& a, const Turn& b) { return a.granule < b.granule; });
+
+  std::vector<Resident> stored(n);
+  ContactList contacts(solid_.contacts().width());
+  std::vector<double> turned;
+  auto turn = turns.begin();
+  for (std::size_t k = 0; k < n; ++k) {
+    const Parcel::Granule& g = p.granules[k];
     const int body = number_.at(static_cast<std::size_t>(g.body));
-    if (g.record) {
-      StoredGranule s = g.stored;
-      s.body = body;
-      solid_.add_stored(solid_.store().rounded(s), g.record, g.length);
-    } else {
+    if (!g.record) {
       solid_.take_in(g.tag, body);
       shell_.arrives(index_.at(g.tag), {body, g.place});
+      continue;
     }
+    StoredGranule s = g.stored;
+    s.body = body;
+    s = solid_.store().rounded(s);
+    stored[k] = {s.position, s.radius, s.tag, s.body};
+    contacts.clear();
+    for (; turn != turns.end() && turn->granule == static_cast<int>(k); ++turn) {
+      const Parcel::Edge& e = *turn->edge;
+      const double* history = e.history;
+      if (history && e.low != g.tag) {
+        turned.assign(history, history + solid_.contacts().width());
+        solid_.contacts().change_side(turned.data());
+        history = turned.data();
+      }
+      const Resident* const partner = turn->partner < 0 ? nullptr : &stored[static_cast<std::size_t>(turn->partner)];
+      contacts.add(e.low == g.tag ? e.high : e.low, history, partner);
+    }
+    solid_.add_stored(s, g.record, g.length, contacts);
   }
-  for (const Parcel::Edge& e : p.edges) solid_.freeze_in_frame(e.low, e.high, e.history);
-  for (const Parcel::Granule& g : p.granules)
-    if (g.record) solid_.enter_store(g.tag);
+  for (const Parcel::Edge* e : of_others) solid_.freeze_in_frame(e->low, e->high, e->history);
 }
 
 void Parcels::end_as_it_was() {

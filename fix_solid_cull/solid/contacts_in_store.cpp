@@ -31,14 +31,23 @@ void contacts_in_store(const GranuleStore& store, const SolidBodies& bodies, std
                        std::vector<std::int64_t>& partners) {
   const auto found = store.find(tag);
   if (!found) return;
-  const Resident& granule = *found;
+  std::vector<Resident> near;
+  contacts_in_store(store, bodies, *found, gap, near);
+  for (const Resident& g : near) partners.push_back(g.tag);
+}
+
+void contacts_in_store(const GranuleStore& store, const SolidBodies& bodies, const Resident& granule, double gap,
+                       std::vector<Resident>& partners) {
   const int body = bodies.root(granule.body), frame = store.frame_of(granule.body);
+  if (!store.occupies(frame)) return;
   const double farthest = gap * (granule.radius + store.largest_radius());
   const auto look_around = [&](const Vec3& place) {
     store.for_each_near(frame, {place, granule.radius}, farthest, [&](const Resident& other) {
       const double reach = (1 + gap) * (granule.radius + other.radius);
-      if (other.tag == tag || (other.position - place).squaredNorm() > reach * reach || bodies.root(other.body) != body) return;
-      if (std::find(partners.begin(), partners.end(), other.tag) == partners.end()) partners.push_back(other.tag);
+      if (other.tag == granule.tag || (other.position - place).squaredNorm() > reach * reach || bodies.root(other.body) != body)
+        return;
+      const auto known = [&](const Resident& g) { return g.tag == other.tag; };
+      if (std::none_of(partners.begin(), partners.end(), known)) partners.push_back(other);
     });
   };
   look_around(granule.position);

@@ -1,4 +1,4 @@
-// Contacts between granules of one body that are both in the store, found from where they lie: a compact store keeps none.
+// Granules of one body that touch, or nearly so, and are both in the store, found from where they lie.
 #pragma once
 
 #include <cstdint>
@@ -14,5 +14,8 @@ namespace solidcull {
 /// answer is the same for as long as both are stored. Costs O(neighbours). Local.
 void contacts_in_store(const GranuleStore& store, const SolidBodies& bodies, std::int64_t tag, double gap,
                        std::vector<std::int64_t>& partners);
+/// The same for one that need not be in the store yet.
+void contacts_in_store(const GranuleStore& store, const SolidBodies& bodies, const Resident& granule, double gap,
+                       std::vector<Resident>& partners);
 
 }  // namespace solidcull

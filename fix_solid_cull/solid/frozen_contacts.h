@@ -51,9 +51,14 @@ class FrozenContacts {
   /// Calls visit(partner, history as `tag` sees it or nullptr) for each contact of `tag`.
   template <class Visit>
   void for_each(std::int64_t tag, Visit visit) const {
+    for_each_here(tag, visit);
+    if (elsewhere_) for_each_elsewhere(tag, [&](std::int64_t partner) { visit(partner, nullptr); });
+  }
+  /// Those of them that stand in the graph.
+  template <class Visit>
+  void for_each_here(std::int64_t tag, Visit visit) const {
     Seen seen(width());
     for (std::uint32_t e = first(tag); e != none; e = next(e, tag)) visit(other(e, tag), read(e, tag, seen.data()));
-    if (elsewhere_) for_each_elsewhere(tag, [&](std::int64_t partner) { visit(partner, nullptr); });
   }
   /// Partners only; cheaper.
   template <class Visit>

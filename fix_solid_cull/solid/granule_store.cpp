@@ -93,7 +93,8 @@ auto GranuleStore::head_of_row(const StoredGranule& g, std::size_t tail) const -
 
 // ------------------------------------------------------------------------------------------------------------------ in and out
 
-void GranuleStore::add(const StoredGranule& granule, const double* record, int length, const std::vector<int>& transient) {
+void GranuleStore::add(const StoredGranule& granule, const double* record, int length, const std::vector<int>& transient,
+                       const std::vector<std::uint64_t>& tail) {
   const std::int32_t tag = narrow_tag(granule.tag);
   if (contains(tag)) throw std::logic_error("granule " + std::to_string(tag) + " went into the store twice");
   for (const int i : transient)
@@ -107,7 +108,7 @@ void GranuleStore::add(const StoredGranule& granule, const double* record, int l
   else
     first_free_ = next_at(s);
 
-  const auto head = head_of_row(granule, 0);
+  const auto head = head_of_row(granule, tail.size());
   std::vector<std::uint64_t>& row = scratch_;
   row.resize(record_begin + static_cast<std::size_t>(length));
   std::copy(head.begin(), head.end(), row.begin());
@@ -122,6 +123,8 @@ void GranuleStore::add(const StoredGranule& granule, const double* record, int l
       row[record_begin + i] = 0;
     }
   }
+
+  row.insert(row.end(), tail.begin(), tail.end());
 
   set_position(s, place, granule.radius);
   set_field(s, tag_field, tag);
@@ -152,7 +155,9 @@ StoredGranule GranuleStore::take(std::int64_t tag, std::vector<double>& record) 
   return g;
 }
 
-Resident GranuleStore::resident(int s) const { return {position(s), number_of(rows_.word_1(row_at(s))), tag_at(s), body_at(s)}; }
+Resident GranuleStore::resident(int s) const {
+  return {position(s), number_of(rows_.word_1(row_at(s))), tag_at(s), body_at(s), s};
+}
 
 StoredGranule GranuleStore::granule(int s) const {
   std::uint64_t row[record_begin];
@@ -237,18 +242,23 @@ void GranuleStore::set_record(std::int64_t tag, int layout, std::vector<double> 
   set_row(s, rows_.put(row.data(), static_cast<int>(row.size())));
 }
 
-void GranuleStore::tail(std::int64_t tag, std::vector<std::uint64_t>& out) const {
-  const std::vector<std::uint64_t> row = row_of(slot_or_throw(tag));
-  out.assign(row.end() - static_cast<std::ptrdiff_t>(tail_of(row)), row.end());
+void GranuleStore::read_tail(int s, std::vector<std::uint64_t>& out) const {
+  const PackedRows::Place row = row_at(s);
+  const int length = rows_.length(row);
+  const std::uint64_t word_0 = tag_word(tag_at(s));
+  std::uint64_t words = 0;
+  rows_.get_some(row, word_0, record_begin - 1, record_begin, &words);
+  words >>= tail_shift;
+  out.resize(words);
+  if (words) rows_.get_some(row, word_0, length - static_cast<int>(words), length, out.data());
 }
 
-void GranuleStore::set_tail(std::int64_t tag, const std::vector<std::uint64_t>& tail) {
-  const int s = slot_or_throw(tag);
+void GranuleStore::write_tail(int s, const std::vector<std::uint64_t>& tail) {
   std::vector<std::uint64_t> row = row_of(s);
   row.resize(row.size() - tail_of(row));
   row.insert(row.end(), tail.begin(), tail.end());
   std::uint64_t& last = row[record_begin - 1];
-  last = (last & ((std::uint64_t{1} << 33) - 1)) | static_cast<std::uint64_t>(tail.size()) << 33;
+  last = (last & ((std::uint64_t{1} << tail_shift) - 1)) | static_cast<std::uint64_t>(tail.size()) << tail_shift;
   rows_.drop(row_at(s));
   set_row(s, rows_.put(row.data(), static_cast<int>(row.size())));
 }

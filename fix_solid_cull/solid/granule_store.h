@@ -41,6 +41,7 @@ struct Resident {
   double radius;  ///< m
   std::int64_t tag;
   int body;
+  int slot = -1;  ///< where the store has it, for as long as nothing goes in or out; below 0: not known
 };
 
 /// Granules with their engine records (opaque doubles), found by tag in O(1) and by place in O(neighbours). Each body has a grid
@@ -73,8 +74,9 @@ class GranuleStore {
   }
 
   /// Takes a granule in. A tag that is in the store already, or that is no 32-bit number, is a std::logic_error. The words of
-  /// the record at the indices `transient` are kept until forget_transient() and are 0.0 afterwards.
-  void add(const StoredGranule& granule, const double* record, int length, const std::vector<int>& transient = {});
+  /// the record at the indices `transient` are kept until forget_transient() and are 0.0 afterwards. tail: see tail().
+  void add(const StoredGranule& granule, const double* record, int length, const std::vector<int>& transient = {},
+           const std::vector<std::uint64_t>& tail = {});
   /// Takes it out; `record` receives its doubles. A tag that is not there is a std::logic_error.
   StoredGranule take(std::int64_t tag, std::vector<double>& record);
 
@@ -90,8 +92,10 @@ class GranuleStore {
   /// still. Likewise.
   void set_record(std::int64_t tag, int layout, std::vector<double> record, const std::vector<int>& transient);
   /// Some words more, none at first; they go with it and are lost when it is taken out. Likewise.
-  void tail(std::int64_t tag, std::vector<std::uint64_t>& out) const;
-  void set_tail(std::int64_t tag, const std::vector<std::uint64_t>& tail);
+  void tail(std::int64_t tag, std::vector<std::uint64_t>& out) const { read_tail(slot_or_throw(tag), out); }
+  void tail(const Resident& g, std::vector<std::uint64_t>& out) const { read_tail(slot_of(g), out); }
+  void set_tail(std::int64_t tag, const std::vector<std::uint64_t>& tail) { write_tail(slot_or_throw(tag), tail); }
+  void set_tail(const Resident& g, const std::vector<std::uint64_t>& tail) { write_tail(slot_of(g), tail); }
   bool transient_known(std::int64_t tag) const;          ///< it has transient words that are not forgotten yet
   void forget_transient() { transient_ = Transient(); }  ///< costs what was added since the last call
 
@@ -188,6 +192,7 @@ class GranuleStore {
   void for_each_frame(Visit visit) const {
     for (const auto& grid : grids_) visit(grid.first, grid.second.box.lo, grid.second.box.hi);
   }
+  bool occupies(int frame) const { return grids_.count(frame) != 0; }  ///< it has granules
   /// Corners of the box around the centres in this frame, which has granules.
   const Vec3& lowest(int frame) const { return grids_.at(frame).box.lo; }
   const Vec3& highest(int frame) const { return grids_.at(frame).box.hi; }
@@ -354,10 +359,13 @@ class GranuleStore {
   Head head_of_row(const StoredGranule& g, std::size_t tail) const;
   std::vector<std::uint64_t> row_of(int s) const;
   Vec3 rounded(const Vec3& place, double radius) const;
-  static std::size_t tail_of(const std::vector<std::uint64_t>& row) { return row[record_begin - 1] >> 33; }
+  static constexpr int tail_shift = 33;  // of its length in the last word of the head
+  static std::size_t tail_of(const std::vector<std::uint64_t>& row) { return row[record_begin - 1] >> tail_shift; }
   StoredGranule granule(int s) const;
   void read_record(int s, std::vector<double>& out) const;
   void change(int s, const StoredGranule& before, const StoredGranule& after);
+  void read_tail(int s, std::vector<std::uint64_t>& out) const;
+  void write_tail(int s, const std::vector<std::uint64_t>& tail);
 
   // in and out of a grid; a body's count and box
   void seat(int s, int frame);
@@ -369,6 +377,7 @@ class GranuleStore {
   // the table of tags
   int slot_of(std::int64_t tag) const;
   int slot_or_throw(std::int64_t tag) const;
+  int slot_of(const Resident& g) const { return g.slot < 0 ? slot_or_throw(g.tag) : g.slot; }
   std::size_t index_place(std::int32_t tag) const;
   void index(int s);
   void unindex(std::int32_t tag);

@@ -5,7 +5,6 @@
 #include <set>
 
 #include "contacts_in_store.h"
-#include "solid_state.h"
 
 namespace solidcull {
 namespace {
@@ -30,19 +29,22 @@ void Solid::open_store() {
         cell, scales_.compact() ? GranuleStore::Precision::rounded : GranuleStore::Precision::exact);
   }
   bodies_.set_elsewhere([this](std::int64_t tag) { return store_->body_of(tag); });
-  if (!scales_.compact() && !scales_.refills()) return;
-  const double gap = scales_.refills() ? gap_between_sites : SolidStateLaw::gap;
-  contacts_.set_elsewhere([this, gap](std::int64_t tag, std::vector<std::int64_t>& partners) {
-    contacts_in_store(*store_, bodies_, tag, gap, partners);
-  });
+  if (scales_.refills())
+    contacts_.set_elsewhere([this](std::int64_t tag, std::vector<std::int64_t>& partners) {
+      contacts_in_store(*store_, bodies_, tag, gap_between_sites, partners);
+    });
+  if (!scales_.compact()) return;
+  inner_ = std::make_unique<InnerContacts>(*store_, bodies_);
+  inner_->set_layout(contacts_.layout(), contacts_.vectors());
+  contacts_.set_elsewhere([this](std::int64_t tag, std::vector<std::int64_t>& partners) { inner_->find(tag, partners); });
 }
 
 bool Solid::set_histories(const std::vector<bool>& flips, const std::vector<int>& vectors) {
-  const bool in_use = contacts_.size() > 0 || (scales_.compact() && store_ && store_->size() > 0);
+  const bool in_use = contacts_.size() > 0 || (inner_ && store_->size() > 0);
   if (in_use && flips != contacts_.layout()) return false;
   contacts_.set_layout(flips);
   contacts_.set_vectors(vectors);
-  packed_.set_layout(contacts_.width(), contacts_.vectors());
+  if (inner_) inner_->set_layout(flips, vectors);
   return true;
 }
 
@@ -59,40 +61,7 @@ void Solid::know_radius(int type, double radius) {
 
 // ------------------------------------------------------------------------------------------------------------ what there is
 
-Vec3 Solid::nearest_image(const Vec3& x, const Vec3& to) const {
-  Vec3 image = x;
-  const Vec3& edge = bodies_.periods();
-  for (int d = 0; d < 3; ++d)
-    if (edge[d] > 0) image[d] -= edge[d] * std::round((x[d] - to[d]) / edge[d]);
-  return image;
-}
-
 double Solid::kinetic_energy(int body) const { return exists(body) ? bodies_.body(body).part().kinetic_energy() : 0.0; }
-
-/// From a to the image of b that it touches, in the frame of their body.
-Vec3 Solid::apart(const Resident& a, const Resident& b) const {
-  const Vec3 there = b.position - a.position;
-  if ((bodies_.periods().array() == 0).all()) return there;
-  const Pose& pose = bodies_.pose(a.body);
-  return pose.turned_to_frame(nearest_image(pose.turned_to_world(there), Vec3::Zero()));
-}
-
-bool Solid::inner_history(const Resident& g, std::int64_t partner, double* history) const {
-  const Resident other = *store_->find(partner);
-  std::vector<std::uint64_t> tail;
-  store_->tail(g.tag, tail);
-  std::size_t at = packed_.find(tail, partner);
-  if (at < tail.size()) {
-    packed_.unpack(&tail[at], apart(g, other), history);
-    return true;
-  }
-  store_->tail(partner, tail);
-  at = packed_.find(tail, g.tag);
-  if (at == tail.size()) return false;
-  packed_.unpack(&tail[at], apart(other, g), history);
-  contacts_.change_side(history);
-  return true;
-}
 
 // ------------------------------------------------------------------------------------------------------------ bodies
 
@@ -125,7 +94,7 @@ std::vector<Solid::Merge> Solid::adopt_swallowed() {
     const Pose &from = gone.second, &to = bodies_.pose(body);
     const bool same = from == to;
     const Eigen::Matrix3d turn = to.turn().transpose() * from.turn();
-    if (scales_.compact() && !same) turn_inner_histories(gone.first, turn);
+    if (inner_ && !same) inner_->turn(gone.first, turn);
     if (store_->holds(gone.first) && store_->frame_of(gone.first) != GranuleStore::shared_frame)
       ++standing_version_;  // its granules may stand from now on
     std::vector<std::int64_t> moved;
@@ -210,66 +179,35 @@ void Solid::leave_rank(std::int64_t tag) {
   for (const Kept& c : kept) contacts_.add(c.tag, c.partner, c.history.empty() ? nullptr : c.history.data());
 }
 
-void Solid::turn_inner_histories(int body, const Eigen::Matrix3d& by) {
-  std::vector<Resident> granules;
-  store_->for_each_of_body(body, [&](const Resident& g) { granules.push_back(g); });
-  std::vector<double> history(contacts_.width());
-  std::vector<std::uint64_t> tail, turned;
-  for (const Resident& g : granules) {
-    store_->tail(g.tag, tail);
-    if (tail.empty()) continue;
-    turned.clear();
-    contacts_.for_each_elsewhere(g.tag, [&](std::int64_t partner) {
-      const std::size_t at = packed_.find(tail, partner);
-      if (at == tail.size()) return;
-      const Vec3 normal = apart(g, *store_->find(partner));
-      packed_.unpack(&tail[at], normal, history.data());
-      contacts_.turn(history.data(), by);
-      packed_.pack(partner, history.data(), by * normal, turned);
-    });
-    store_->set_tail(g.tag, turned);
-  }
-}
-
 // ------------------------------------------------------------------------------------------------------------ the store
 
-/// The store says itself which body a granule is in; a compact one also what it touches there, and of the histories of those
-/// contacts few bits are kept. With `store none` none is kept, and what is near is as good as touching.
-void Solid::entered_store(std::int64_t tag) {
-  bodies_.leave(tag);
-  if (scales_.refills()) {
-    contacts_.forget_histories(tag);
-    drop_what_sites_tell(tag);
-  }
-  if (!scales_.compact()) return;
-  const Resident g = *store_->find(tag);
-  std::vector<std::int64_t> partners;
-  contacts_.for_each_partner(tag, [&](std::int64_t partner) { partners.push_back(partner); });
-  std::vector<std::uint64_t> tail;
-  contacts_.for_each(tag, [&](std::int64_t partner, const double* history) {
-    if (!history || contacts_.width() == 0 || !store_->contains(partner)) return;
-    if (std::any_of(partners.begin(), partners.end(),
-                    [&](std::int64_t p) { return p != partner && PackedHistory::alike(p, partner); }))
-      return;
-    packed_.pack(partner, history, apart(g, *store_->find(partner)), tail);
-  });
-  if (!tail.empty()) store_->set_tail(tag, tail);
-  contacts_.drop(tag, [&](std::int64_t partner) { return store_->contains(partner); });
+/// What a compact store keeps of the contacts of g leaves the graph: for its row's tail.
+InnerContacts::Tail Solid::take_from_graph(const StoredGranule& g, bool all_given) {
+  InnerContacts::Tail tail;
+  if (!inner_) return tail;
+  ContactList contacts(contacts_.width());
+  contacts_.for_each_here(g.tag, [&](std::int64_t partner, const double* history) { contacts.add(partner, history); });
+  if (contacts.size() == 0) return tail;
+  const std::vector<char> kept = inner_->pack({g.position, g.radius, g.tag, g.body}, contacts, all_given, tail);
+  std::vector<std::int64_t> gone;
+  for (std::size_t k = 0; k < contacts.size(); ++k)
+    if (kept[k]) gone.push_back(contacts.partner(k));
+  contacts_.drop(g.tag, [&](std::int64_t partner) { return std::find(gone.begin(), gone.end(), partner) != gone.end(); });
+  return tail;
 }
 
-/// Granules that are there already did not know of this one when they went in: what it would be confused with goes.
+/// The store says itself which body the granule is in. With `store none` no history is kept, and what is near is as good as
+/// touching.
+void Solid::entered_store(std::int64_t tag) {
+  bodies_.leave(tag);
+  if (!scales_.refills()) return;
+  contacts_.forget_histories(tag);
+  drop_what_sites_tell(tag);
+}
+
 void Solid::enter_store(std::int64_t tag) {
-  if (scales_.compact()) {
-    std::vector<std::uint64_t> tail;
-    contacts_.for_each_partner(tag, [&](std::int64_t partner) {
-      if (!store_->contains(partner) || !contacts_.contains(tag, partner)) return;  // or it is packed there already
-      store_->tail(partner, tail);
-      const auto at = tail.begin() + static_cast<std::ptrdiff_t>(packed_.find(tail, tag));
-      if (at == tail.end()) return;
-      tail.erase(at, at + static_cast<std::ptrdiff_t>(packed_.words()));
-      store_->set_tail(partner, tail);
-    });
-  }
+  const InnerContacts::Tail tail = take_from_graph(store_->get(tag), true);
+  if (!tail.empty()) store_->set_tail(tag, tail);
   entered_store(tag);
 }
 
@@ -283,18 +221,13 @@ void Solid::drop_what_sites_tell(std::int64_t tag) {
 void Solid::leaves_store(std::int64_t tag) {
   const Resident g = *store_->find(tag);
   bodies_.take_in(tag, g.body);
-  if (scales_.refills()) contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { contacts_.add(tag, partner, nullptr); });
-  if (!scales_.compact()) return;
-  std::vector<double> history(contacts_.width());
-  std::vector<std::uint64_t> tail;
-  contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) {
-    contacts_.add(tag, partner, inner_history(g, partner, history.data()) ? history.data() : nullptr);
-    store_->tail(partner, tail);
-    const auto at = tail.begin() + static_cast<std::ptrdiff_t>(packed_.find(tail, tag));
-    if (at == tail.end()) return;
-    tail.erase(at, at + static_cast<std::ptrdiff_t>(packed_.words()));
-    store_->set_tail(partner, tail);
-  });
+  if (!inner_) {
+    contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { contacts_.add(tag, partner, nullptr); });
+    return;
+  }
+  ContactList contacts(contacts_.width());
+  inner_->unpack(g, contacts);
+  for (std::size_t k = 0; k < contacts.size(); ++k) contacts_.add(tag, contacts.partner(k), contacts.history(k));
 }
 
 /// Where a granule must go, however far that is. What is at a site already stays, taken or not: it may come from another rank.
@@ -323,7 +256,8 @@ StoredGranule Solid::as_stored(const StoredGranule& g) {
 void Solid::put_away(const StoredGranule& g, const std::vector<double>& record, const std::vector<int>& transient,
                      const std::vector<WallLoad>& loads) {
   if (!loads.empty()) wall_loads_.add(g.tag, g.body, loads);
-  store_->add(g, record.data(), static_cast<int>(record.size()), transient);
+  const InnerContacts::Tail tail = take_from_graph(g, false);
+  store_->add(g, record.data(), static_cast<int>(record.size()), transient, tail);
   entered_store(g.tag);
   ledger_.stored(g);
   know_radius(g.type, g.radius);
@@ -341,6 +275,18 @@ void Solid::add_stored(const StoredGranule& g, const double* record, int length)
   store_->add(g, record, length);
   ledger_.stored(g);
   know_radius(g.type, g.radius);
+}
+
+void Solid::add_stored(const StoredGranule& g, const double* record, int length, const ContactList& contacts) {
+  InnerContacts::Tail tail;
+  std::vector<char> kept(contacts.size());
+  if (inner_) kept = inner_->pack({g.position, g.radius, g.tag, g.body}, contacts, true, tail);
+  store_->add(g, record, length, {}, tail);
+  ledger_.stored(g);
+  know_radius(g.type, g.radius);
+  for (std::size_t k = 0; k < contacts.size(); ++k)
+    if (!kept[k]) contacts_.add(g.tag, contacts.partner(k), contacts.history(k));
+  entered_store(g.tag);
 }
 
 std::size_t Solid::fit() {

@@ -10,8 +10,8 @@
 #include "frozen_contacts.h"
 #include "frozen_wall_loads.h"
 #include "granule_store.h"
+#include "inner_contacts.h"
 #include "ledger.h"
-#include "packed_history.h"
 #include "scales.h"
 #include "sites.h"
 #include "solid_bodies.h"
@@ -84,12 +84,14 @@ class Solid {
   }
   Vec3 in_world(const Resident& g) const { return bodies_.pose(g.body).to_world(g.position); }
   /// The periodic image of x that is nearest to the place `to`.
-  Vec3 nearest_image(const Vec3& x, const Vec3& to) const;
+  Vec3 nearest_image(const Vec3& x, const Vec3& to) const { return bodies_.nearest_image(x, to); }
   double kinetic_energy(int body) const;
   /// Counts how often stored granules came to stand still in other ways than by being put away.
   int standing_version() const { return standing_version_; }
   /// History of a contact inside a compact store, as g sees it; false if it has none.
-  bool inner_history(const Resident& g, std::int64_t partner, double* history) const;
+  bool inner_history(const Resident& g, std::int64_t partner, double* history) const {
+    return inner_ && inner_->history(g, partner, history);
+  }
 
   // --- bodies
   SolidBodies::Place lock(std::int64_t tag, const MovingGranule& granule, const MassOf& mass_of) {
@@ -151,6 +153,8 @@ class Solid {
   void take_in(std::int64_t tag, int body) { bodies_.take_in(tag, body); }
   void add_stored(const StoredGranule& g, const double* record, int length);
   void enter_store(std::int64_t tag);
+  /// Both at once, for a granule with all contacts that it has with granules which are stored already.
+  void add_stored(const StoredGranule& g, const double* record, int length, const ContactList& contacts);
   void stands_otherwise() { ++standing_version_; }
 
   // --- walls
@@ -174,11 +178,10 @@ class Solid {
  private:
   Vec3 free_site(int body, const Vec3& place, double radius) const;
   void find_grid(int body);
-  void entered_store(std::int64_t tag);
+  InnerContacts::Tail take_from_graph(const StoredGranule& g, bool all_given);
   void leaves_store(std::int64_t tag);
+  void entered_store(std::int64_t tag);
   void drop_what_sites_tell(std::int64_t tag);
-  Vec3 apart(const Resident& a, const Resident& b) const;
-  void turn_inner_histories(int body, const Eigen::Matrix3d& by);
   template <class Tell>
   void tell(Tell tell) {
     for (BodyFollower* f : followers_) tell(*f);
@@ -189,9 +192,9 @@ class Solid {
   std::unique_ptr<Sites> sites_;  // `store none`
   std::unique_ptr<GranuleStore> store_;
   FrozenContacts contacts_;
-  PackedHistory packed_;  // of contacts in a compact store: in the tail of the granule that went in later
   SolidBodies bodies_;
-  FrozenWallLoads wall_loads_;  // of stored granules
+  std::unique_ptr<InnerContacts> inner_;  // of a compact store
+  FrozenWallLoads wall_loads_;            // of stored granules
   Ledger ledger_;
   std::vector<double> largest_radius_by_type_;
   int standing_version_ = 0;

@@ -120,6 +120,8 @@ Vec3 SolidBodies::to_image_of(const Vec3& there) const {
   return shift;
 }
 
+Vec3 SolidBodies::nearest_image(const Vec3& x, const Vec3& to) const { return x + to_image_of(x - to); }
+
 int SolidBodies::found() { return found(SolidBody()); }
 
 int SolidBodies::found(const SolidBody& body) {

@@ -170,6 +170,8 @@ class SolidBodies {
   /// Edges of the periodic box, 0 where it is not periodic (m).
   void set_periods(const Vec3& periods) { periods_ = periods; }
   const Vec3& periods() const { return periods_; }
+  /// The periodic image of x that is nearest to the place `to`.
+  Vec3 nearest_image(const Vec3& x, const Vec3& to) const;
 
   /// A granule is locked: it joins the bodies of its frozen contacts (which merge if they were several), or founds one.
   /// Momentum and angular momentum are kept, but for what a grounded body is given.

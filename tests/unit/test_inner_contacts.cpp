@@ -1,0 +1,222 @@
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+#include <set>
+
+#include "packed_history.h"
+#include "solid.h"
+#include "solid_state.h"
+
+namespace solidcull {
+namespace {
+
+constexpr std::size_t width = 7;  // a vector, a number that changes sign with the side, a vector
+
+Settings compact_settings() {
+  Settings s;
+  s.store = Store::compact;
+  return s;
+}
+
+/// A body whose granules, of several sizes, go in and out of a compact store, with its contacts kept beside it.
+struct Packing {
+  using Numbers = std::vector<double>;
+  std::mt19937 random;
+  Scales scales;
+  Solid solid;
+  std::map<std::int64_t, StoredGranule> granules;
+  std::map<std::pair<std::int64_t, std::int64_t>, Numbers> contacts;  // as the lower tag sees it; empty: no history
+  std::set<std::int64_t> stored;
+  Vec3 periods;
+  int body;
+
+  Packing(unsigned seed, int n, const Vec3& edges) : random(seed), scales(compact_settings()), solid(scales), periods(edges) {
+    scales.set(1.0, 9.81);
+    solid.set_histories({true, true, true, true, false, false, false}, {0, 4});
+    solid.set_types(1);
+    solid.set_periods(periods);
+    solid.open_store();
+    SolidBody b;
+    b.grounded = true;
+    body = solid.found(b);
+    const double size = 0.8 * std::cbrt(n);
+    for (int tag = 1; tag <= n; ++tag) {
+      StoredGranule g;
+      g.tag = tag;
+      g.type = 1;
+      g.body = body;
+      g.radius = 0.4 + 0.2 * share();
+      g.mass = g.radius;
+      g.position = size * Vec3(share(), share(), share());
+      granules[tag] = solid.store().rounded(g);
+      solid.take_in(tag, body);
+    }
+    for (const auto& [a, g] : granules)
+      for (const auto& [c, h] : granules) {
+        if (a >= c) continue;
+        const Vec3 apart = solid.nearest_image(h.position, g.position) - g.position;
+        const double gap = apart.norm() / (g.radius + h.radius) - 1;
+        if (gap > SolidStateLaw::gap) continue;
+        Numbers history;
+        if (share() > 0.2) {
+          const Vec3 shear = in_plane(apart, 1e-6), torque = in_plane(apart, 1e-8);
+          history = {shear[0], shear[1], shear[2], share() - 0.5, torque[0], torque[1], torque[2]};
+        }
+        contacts[{a, c}] = history;
+        solid.freeze_in_frame(a, c, history.empty() ? nullptr : history.data());
+      }
+  }
+  double share() { return std::uniform_real_distribution<double>(0, 1)(random); }
+  Vec3 in_plane(const Vec3& normal, double size) {
+    const Vec3 v(share() - 0.5, share() - 0.5, share() - 0.5), n = normal.normalized();
+    return size * (v - v.dot(n) * n);
+  }
+  void put_away(std::int64_t tag) {
+    solid.put_away(granules.at(tag), {1, 2, static_cast<double>(tag)}, {}, {});
+    stored.insert(tag);
+  }
+  void bring_back(std::int64_t tag) {
+    std::vector<double> record;
+    EXPECT_EQ(solid.bring_back(tag, record).position, granules.at(tag).position);
+    stored.erase(tag);
+  }
+  /// Each contact of the graph and of the store once from each side. off: of vectors, in their own size.
+  void expect_all_in(const Solid& solid, double off, const Eigen::Matrix3d& turn = Eigen::Matrix3d::Identity()) {
+    for (const auto& one : granules) {
+      const std::int64_t tag = one.first;
+      std::set<std::int64_t> partners;
+      const auto see = [&](std::int64_t partner, const double* history) {
+        EXPECT_TRUE(partners.insert(partner).second) << tag << " and " << partner << " touch twice";
+        const auto due = contacts.find({std::min(tag, partner), std::max(tag, partner)});
+        ASSERT_NE(due, contacts.end()) << tag << " and " << partner;
+        ASSERT_EQ(history != nullptr, !due->second.empty()) << tag << " and " << partner;
+        if (!history) return;
+        std::vector<double> is(history, history + width);
+        if (tag > partner) solid.contacts().change_side(is.data());
+        EXPECT_NEAR(is[3], due->second[3], 2e-5 * std::abs(due->second[3]));
+        for (const int v : {0, 4}) {
+          const Vec3 vector = turn * Vec3(Eigen::Map<const Vec3>(due->second.data() + v));
+          EXPECT_LE((Eigen::Map<const Vec3>(is.data() + v) - vector).norm(), off * vector.norm()) << tag << ' ' << partner;
+        }
+      };
+      solid.contacts().for_each_here(tag, see);
+      solid.contacts().for_each_elsewhere(tag, [&](std::int64_t partner) {
+        double history[width];
+        see(partner, solid.inner_history(*solid.store().find(tag), partner, history) ? history : nullptr);
+      });
+      std::size_t due = 0;
+      for (const auto& c : contacts) due += c.first.first == tag || c.first.second == tag;
+      EXPECT_EQ(partners.size(), due) << "contacts of " << tag;
+    }
+  }
+};
+
+constexpr double rounding = 0.01;  // of vectors in the plane of contact
+
+TEST(InnerContacts, what_goes_in_and_out_of_a_compact_store_keeps_its_contacts) {
+  for (const Vec3& periods : {Vec3(0, 0, 0), Vec3(4.9, 0, 5.1)}) {
+    Packing p(1, 200, periods);
+    ASSERT_GT(p.contacts.size(), 500u);
+    p.expect_all_in(p.solid, 1e-14);
+    for (int turn = 0; turn < 1500; ++turn) {
+      const std::int64_t tag = 1 + static_cast<std::int64_t>(p.share() * 200);
+      if (p.stored.count(tag))
+        p.bring_back(tag);
+      else
+        p.put_away(tag);
+      if (turn % 250 == 249) p.expect_all_in(p.solid, rounding);
+    }
+    for (const auto& g : p.granules)
+      if (!p.stored.count(g.first)) p.put_away(g.first);
+    EXPECT_EQ(p.solid.contacts().size(), 0u);
+    p.expect_all_in(p.solid, rounding);
+    for (const auto& g : p.granules) p.bring_back(g.first);
+    EXPECT_EQ(p.solid.contacts().size(), p.contacts.size());
+    p.expect_all_in(p.solid, rounding);
+  }
+}
+
+TEST(InnerContacts, histories_turn_with_a_body_that_is_swallowed) {
+  Packing p(2, 150, Vec3::Zero());
+  for (const auto& g : p.granules) p.put_away(g.first);
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, -3).normalized()).toRotationMatrix();
+  GranuleStore& store = const_cast<GranuleStore&>(p.solid.store());  // as Solid::adopt_swallowed() has it
+  InnerContacts inner(store, p.solid.bodies());
+  inner.set_layout(p.solid.contacts().layout(), p.solid.contacts().vectors());
+  inner.turn(p.body, turn);
+  for (const auto& g : p.granules) store.move(g.first, p.body, turn * g.second.position + Vec3(7, -3, 0.1));
+  p.expect_all_in(p.solid, 2 * rounding, turn);
+}
+
+TEST(InnerContacts, a_granule_that_arrives_with_its_contacts_is_as_one_that_was_put_away) {
+  Packing p(3, 150, Vec3::Zero());
+  Scales scales(compact_settings());
+  scales.set(1.0, 9.81);
+  Solid arrived(scales);
+  arrived.set_histories(p.solid.contacts().layout(), p.solid.contacts().vectors());
+  arrived.set_types(1);
+  arrived.open_store();
+  SolidBody body;
+  body.grounded = true;
+  const int number = arrived.found(body);
+  ContactList contacts(width);
+  for (const auto& [tag, granule] : p.granules) {
+    contacts.clear();
+    for (const auto& [pair, history] : p.contacts)
+      if (pair.second == tag) {
+        std::vector<double> own = history;
+        if (!own.empty()) arrived.contacts().change_side(own.data());
+        contacts.add(pair.first, own.empty() ? nullptr : own.data());
+      }
+    StoredGranule g = granule;
+    g.body = number;
+    const double record[] = {1, 2, static_cast<double>(tag)};
+    arrived.add_stored(g, record, 3, contacts);
+  }
+  EXPECT_EQ(arrived.contacts().size(), 0u);
+  p.expect_all_in(arrived, rounding);
+  for (const auto& g : p.granules) p.put_away(g.first);
+  EXPECT_EQ(arrived.store().memory_bytes(), p.solid.store().memory_bytes());
+}
+
+TEST(InnerContacts, who_arrives_takes_away_what_it_would_be_confused_with) {
+  std::int64_t alike = 3;
+  while (!PackedHistory::alike(2, alike)) ++alike;
+  Packing p(4, 2, Vec3::Zero());
+  StoredGranule g = p.granules.at(1);
+  const double record[] = {1, 2, 3}, history[width] = {0, 1e-6, 0, 0.25, 0, 1e-8, 0};
+  Scales scales(compact_settings());
+  scales.set(1.0, 9.81);
+  Solid solid(scales);
+  solid.set_histories(p.solid.contacts().layout(), p.solid.contacts().vectors());
+  solid.set_types(1);
+  solid.open_store();
+  const int body = solid.found(SolidBody());
+  ContactList contacts(width);
+  const auto arrives = [&](std::int64_t tag, double x) {
+    g.tag = tag;
+    g.body = body;
+    g.radius = 0.5;
+    g.position = Vec3(x, 0, 0);
+    solid.add_stored(g, record, 3, contacts);
+  };
+  const auto known = [&](std::int64_t tag, std::int64_t partner) {
+    double numbers[width];
+    return solid.inner_history(*solid.store().find(tag), partner, numbers);
+  };
+  arrives(2, 0);
+  contacts.add(2, history);
+  arrives(1, 1);
+  EXPECT_TRUE(known(1, 2));
+  EXPECT_TRUE(known(2, 1));
+  contacts.clear();
+  contacts.add(1, history);
+  arrives(alike, 2);
+  EXPECT_FALSE(known(1, 2));
+  EXPECT_TRUE(known(1, alike));
+  EXPECT_TRUE(known(alike, 1));
+}
+
+}  // namespace
+}  // namespace solidcull
