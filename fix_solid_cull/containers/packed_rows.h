@@ -10,13 +10,15 @@
 #include <vector>
 
 #include "chunked_array.h"
+#include "word_view.h"
 
 namespace solidcull {
 
 /// Each row is kept as a mask of the words in which it differs from a pattern, and those words. A pattern's word is a number, or
 /// "the same as key word k": the row's first `keys` words (a granule's tag, radius, mass) come back in its engine record. Word 0
 /// is not kept at all: who asks for a row knows it. Masks are shared between rows, so that a row costs 8 bytes for the number of
-/// its shape and of its place, and 8 for each word that differs.
+/// its shape and of its place, and 8 for each word that differs. Behind a row may stand a tail, words that are like no others: 8
+/// bytes each.
 class PackedRows {
  public:
   struct Place {
@@ -24,28 +26,44 @@ class PackedRows {
   };
   static constexpr int keys = 3;
 
-  Place put(const std::uint64_t* row, int length) {
-    const Key key = length <= longest ? best_key(row, length) : Key{none, length, {}};
-    const std::uint32_t number = shape_of(key);
-    Shape& shape = shapes_[number];
-    ++shape.uses;
-    if (key.pattern != none) ++patterns_[key.pattern].uses;
-    const Place place{number, shape.words ? new_blob(shape.words) : 0};
-    if (shape.words == 0) return place;
-    std::uint64_t* blob = pools_[shape.words].rows.row(place.blob);
+  Place put(const std::uint64_t* row, int length, WordView tail) {
+    Key key = length <= longest ? best_key(row, length) : Key{none, length, 0, {}};
+    key.tail = static_cast<int>(tail.size());
+    std::uint64_t* blob = nullptr;
+    const Place place = new_place(key, blob);
     if (key.pattern == none)
-      std::copy(row + 1, row + length, blob);
+      blob = std::copy(row + 1, row + length, blob);
     else
       each_bit(key.mask, [&](int i) { *blob++ = row[i]; });
+    std::copy(tail.begin(), tail.end(), blob);
     return place;
   }
 
-  int length(Place p) const { return shapes_[p.shape].key.length; }
+  /// Another tail, which is not that of this row, behind the same row: where that is now.
+  Place with_tail(Place p, WordView tail) {
+    Key key = shapes_[p.shape].key;
+    const std::uint64_t* const old = blob_of(p);
+    const int own = shapes_[p.shape].words - key.tail;
+    key.tail = static_cast<int>(tail.size());
+    std::uint64_t* blob = nullptr;
+    const Place place = new_place(key, blob);
+    std::copy(old, old + own, blob);
+    std::copy(tail.begin(), tail.end(), blob + own);
+    drop(p);
+    return place;
+  }
+
+  int length(Place p) const { return shapes_[p.shape].key.length; }  ///< without the tail
+  /// Stays where it is until the row is dropped.
+  WordView tail(Place p) const {
+    const Shape& shape = shapes_[p.shape];
+    return {blob_of(p) + shape.words - shape.key.tail, static_cast<std::size_t>(shape.key.tail)};
+  }
 
   /// The first `count` words; row[0] is the caller's and is read, all others are written.
   void get(Place p, std::uint64_t* row, int count) const {
     const Shape& shape = shapes_[p.shape];
-    const std::uint64_t* blob = shape.words ? pools_[shape.words].rows.row(p.blob) : nullptr;
+    const std::uint64_t* blob = blob_of(p);
     if (shape.key.pattern == none) {
       std::copy(blob, blob + count - 1, row + 1);
       return;
@@ -59,7 +77,7 @@ class PackedRows {
   /// The words from `first` to before `last`, given word 0.
   void get_some(Place p, std::uint64_t word_0, int first, int last, std::uint64_t* out) const {
     const Shape& shape = shapes_[p.shape];
-    const std::uint64_t* blob = shape.words ? pools_[shape.words].rows.row(p.blob) : nullptr;
+    const std::uint64_t* blob = blob_of(p);
     if (shape.key.pattern == none) {
       for (int i = first; i < last; ++i) out[i - first] = i == 0 ? word_0 : blob[i - 1];
       return;
@@ -99,8 +117,10 @@ class PackedRows {
                         number_of_.size() * node + number_of_.bucket_count() * sizeof(void*) +
                         families_.capacity() * sizeof(Family) + patterns_.capacity() * sizeof(Pattern) +
                         pools_.capacity() * sizeof(Pool);
-    for (const Family& f : families_)
-      bytes += f.patterns.capacity() * sizeof(f.patterns[0]) + f.last.capacity() * sizeof(f.last[0]);
+    for (const Family& f : families_) {
+      bytes += f.patterns.capacity() * sizeof(f.patterns[0]) + f.recent.capacity() * sizeof(f.recent[0]);
+      for (const auto& row : f.recent) bytes += row.capacity() * sizeof(row[0]);
+    }
     for (const Pattern& p : patterns_)
       bytes += p.words.capacity() * sizeof(p.words[0]) + p.repeats.capacity() * sizeof(p.repeats[0]);
     for (const Pool& p : pools_) bytes += p.rows.memory_bytes();
@@ -111,26 +131,28 @@ class PackedRows {
   static constexpr int longest = 256;  // words; a longer row is kept as it is
   static constexpr std::size_t patterns_per_length = 32;
   static constexpr unsigned look_at_all_every = 16;  // rows
+  static constexpr std::size_t recent_rows = 4;
   static constexpr int none = -1;
   static constexpr std::size_t chunk_bytes = 2048;  // of the blobs of one length, of which there are many
   static constexpr std::uint32_t no_blob = UINT32_MAX;
 
   using Mask = std::array<std::uint64_t, longest / 64>;
   struct Key {
-    int pattern = none, length = 0;
+    int pattern = none, length = 0, tail = 0;
     Mask mask{};
-    bool operator==(const Key& o) const { return pattern == o.pattern && length == o.length && mask == o.mask; }
+    bool operator==(const Key& o) const { return pattern == o.pattern && length == o.length && tail == o.tail && mask == o.mask; }
   };
   struct HashOfKey {
     std::size_t operator()(const Key& key) const {
       std::uint64_t h = static_cast<std::uint64_t>(key.pattern) << 32 | static_cast<std::uint32_t>(key.length);
+      h ^= static_cast<std::uint64_t>(key.tail) << 20;
       for (const std::uint64_t m : key.mask) h = (h ^ m ^ (h >> 29)) * 0x9e3779b97f4a7c15ULL;
       return static_cast<std::size_t>(h ^ (h >> 32));
     }
   };
   struct Shape {
     Key key;
-    int words = 0;  // in the blob
+    int words = 0;  // in the blob, its tail included
     std::uint32_t uses = 0;
   };
   struct Pattern {
@@ -142,8 +164,8 @@ class PackedRows {
   };
   /// Rows of one length.
   struct Family {
-    std::vector<int> patterns;  // most recent first
-    std::vector<std::uint64_t> last;
+    std::vector<int> patterns;                       // most recent first
+    std::vector<std::vector<std::uint64_t>> recent;  // rows, in no order
     unsigned rows = 0;
   };
   struct Pool {
@@ -195,8 +217,14 @@ class PackedRows {
     return m;
   }
 
+  static Mask difference_all(int length) {
+    Mask m{};
+    for (int i = 1; i < length; ++i) m[i >> 6] |= std::uint64_t{1} << (i & 63);
+    return m;
+  }
+
   /// The first pattern that suits the row as well as it usually suits; else, and now and then, the best of all. A row that is
-  /// more like the one before it than like any pattern makes that one a pattern: a new time step of locking, another kind of
+  /// more like a recent one than like any pattern makes that one a pattern: a new time step of locking, another kind of
   /// granule.
   Key best_key(const std::uint64_t* row, int length) {
     if (families_.size() <= static_cast<std::size_t>(length)) families_.resize(length + 1);
@@ -220,8 +248,15 @@ class PackedRows {
       patterns_[family.patterns[best]].usual = fewest;
     } else {
       Pattern candidate;
-      make_pattern(candidate, family.last.empty() ? row : family.last.data(), length);
-      Mask unlike = difference(candidate, row, length);
+      Mask unlike = difference_all(length);
+      for (const std::vector<std::uint64_t>& recent : family.recent) {
+        Pattern like;
+        make_pattern(like, recent.data(), length);
+        const Mask m = difference(like, row, length);
+        if (bits(m) >= bits(unlike)) continue;
+        candidate = std::move(like);
+        unlike = m;
+      }
       if (2 * std::min(bits(unlike), fewest) > length) {
         make_pattern(candidate, row, length);
         unlike = Mask{};
@@ -236,8 +271,11 @@ class PackedRows {
       }
     }
     std::rotate(family.patterns.begin(), family.patterns.begin() + best, family.patterns.begin() + best + 1);
-    family.last.assign(row, row + length);
-    return {family.patterns.front(), length, mask};
+    if (family.recent.size() < recent_rows)
+      family.recent.emplace_back(row, row + length);
+    else
+      family.recent[family.rows % recent_rows].assign(row, row + length);
+    return {family.patterns.front(), length, 0, mask};
   }
   bool room_in(const Family& family) const {
     return family.patterns.size() < patterns_per_length ||
@@ -268,11 +306,26 @@ class PackedRows {
         found->second = free_shapes_.back();
         free_shapes_.pop_back();
       }
-      shapes_[found->second] = {key, key.pattern == none ? key.length - 1 : bits(key.mask), 0};
+      shapes_[found->second] = {key, key.tail + (key.pattern == none ? key.length - 1 : bits(key.mask)), 0};
     }
     if (key.pattern != none) patterns_[key.pattern].latest = found->second;
     return found->second;
   }
+  /// Room for one more row of this shape; blob: where its words go, nullptr if it has none.
+  Place new_place(const Key& key, std::uint64_t*& blob) {
+    const std::uint32_t number = shape_of(key);
+    Shape& shape = shapes_[number];
+    ++shape.uses;
+    if (key.pattern != none) ++patterns_[key.pattern].uses;
+    const Place place{number, shape.words ? new_blob(shape.words) : 0};
+    blob = blob_of(place);
+    return place;
+  }
+  std::uint64_t* blob_of(Place p) {
+    const int words = shapes_[p.shape].words;
+    return words ? pools_[words].rows.row(p.blob) : nullptr;
+  }
+  const std::uint64_t* blob_of(Place p) const { return const_cast<PackedRows*>(this)->blob_of(p); }
   std::uint32_t new_blob(int words) {
     while (pools_.size() <= static_cast<std::size_t>(words)) pools_.emplace_back(pools_.size());
     Pool& pool = pools_[words];

@@ -1,4 +1,5 @@
-// Contacts between two locked granules. The engine excludes such pairs from its lists; their histories wait here, each once.
+// Contacts between two locked granules of which at least one is an atom. The engine excludes such pairs from its lists; their
+// histories wait here, each once. Those of two stored granules are in InnerContacts.
 #pragma once
 
 #include <Eigen/Core>
@@ -118,7 +119,7 @@ class FrozenContacts {
   }
   /// Removes all contacts of `tag`.
   void erase(std::int64_t tag);
-  /// Removes those with partners for which goes(partner) holds.
+  /// Removes those with partners for which goes(partner) holds, which is asked in the order of for_each_here().
   template <class Goes>
   void drop(std::int64_t tag, Goes goes) {
     for (std::uint32_t e = first(tag), after; e != none; e = after) {

@@ -78,7 +78,7 @@ StoredGranule GranuleStore::rounded(StoredGranule granule) const {
   return granule;
 }
 
-auto GranuleStore::head_of_row(const StoredGranule& g, std::size_t tail) const -> Head {
+auto GranuleStore::head_of_row(const StoredGranule& g) const -> Head {
   Head head{tag_word(g.tag), bits_of(g.radius), bits_of(g.mass), pair_of(g.type, g.layout),
             static_cast<std::uint64_t>(g.lock_step)};
   if (precision_ == Precision::exact) {
@@ -87,14 +87,14 @@ auto GranuleStore::head_of_row(const StoredGranule& g, std::size_t tail) const -
   } else {
     head[5] = word_of({g.normal_load, g.load_change[0], g.load_change[1], g.load_change[2]});
   }
-  head[9] = pair_of(g.walls, static_cast<int>(tail << 1) | g.held);
+  head[9] = pair_of(g.walls, g.held);
   return head;
 }
 
 // ------------------------------------------------------------------------------------------------------------------ in and out
 
 void GranuleStore::add(const StoredGranule& granule, const double* record, int length, const std::vector<int>& transient,
-                       const std::vector<std::uint64_t>& tail) {
+                       WordView tail) {
   const std::int32_t tag = narrow_tag(granule.tag);
   if (contains(tag)) throw std::logic_error("granule " + std::to_string(tag) + " went into the store twice");
   for (const int i : transient)
@@ -108,7 +108,7 @@ void GranuleStore::add(const StoredGranule& granule, const double* record, int l
   else
     first_free_ = next_at(s);
 
-  const auto head = head_of_row(granule, tail.size());
+  const auto head = head_of_row(granule);
   std::vector<std::uint64_t>& row = scratch_;
   row.resize(record_begin + static_cast<std::size_t>(length));
   std::copy(head.begin(), head.end(), row.begin());
@@ -124,12 +124,10 @@ void GranuleStore::add(const StoredGranule& granule, const double* record, int l
     }
   }
 
-  row.insert(row.end(), tail.begin(), tail.end());
-
   set_position(s, place, granule.radius);
   set_field(s, tag_field, tag);
   set_field(s, body_field, granule.body);
-  set_row(s, rows_.put(row.data(), static_cast<int>(row.size())));
+  set_row(s, rows_.put(row.data(), static_cast<int>(row.size()), tail));
   join(granule.body, place);
   seat(s, frame_of(granule.body));
   ++size_;
@@ -195,7 +193,7 @@ std::vector<std::uint64_t> GranuleStore::row_of(int s) const {
 
 void GranuleStore::read_record(int s, std::vector<double>& out) const {
   const std::vector<std::uint64_t> row = row_of(s);
-  out.resize(row.size() - record_begin - tail_of(row));
+  out.resize(row.size() - record_begin);
   if (!out.empty()) std::memcpy(out.data(), row.data() + record_begin, out.size() * sizeof(double));
   if (const auto* known = transient_.of_tag.find(tag_at(s))) {
     std::size_t word = known->first;
@@ -205,12 +203,11 @@ void GranuleStore::read_record(int s, std::vector<double>& out) const {
 
 /// Keeps what has changed but for place and body.
 void GranuleStore::change(int s, const StoredGranule& before, const StoredGranule& after) {
-  if (head_of_row(after, 0) == head_of_row(before, 0)) return;
+  const auto head = head_of_row(after);
+  if (head == head_of_row(before)) return;
   std::vector<std::uint64_t> row = row_of(s);
-  const auto head = head_of_row(after, tail_of(row));
   std::copy(head.begin() + 1, head.end(), row.begin() + 1);
-  rows_.drop(row_at(s));
-  set_row(s, rows_.put(row.data(), static_cast<int>(row.size())));
+  replace_row(s, row);
   mass_ -= before.mass;
   mass_ += after.mass;
 }
@@ -229,38 +226,21 @@ void GranuleStore::set_record(std::int64_t tag, int layout, std::vector<double> 
   const int s = slot_or_throw(tag);
   const auto* known = transient_.of_tag.find(tag_at(s));
   for (const int i : known ? transient_.indices[known->indices] : transient) record.at(static_cast<std::size_t>(i)) = 0;
-  std::vector<std::uint64_t> row = row_of(s), more;
-  more.assign(row.end() - static_cast<std::ptrdiff_t>(tail_of(row)), row.end());
+  std::vector<std::uint64_t> row(record_begin + record.size());
   StoredGranule g = granule(s);
   g.layout = layout;
-  const auto head = head_of_row(g, more.size());
-  row.resize(record_begin + record.size());
+  const auto head = head_of_row(g);
   std::copy(head.begin(), head.end(), row.begin());
   if (!record.empty()) std::memcpy(row.data() + record_begin, record.data(), record.size() * sizeof(double));
-  row.insert(row.end(), more.begin(), more.end());
-  rows_.drop(row_at(s));
-  set_row(s, rows_.put(row.data(), static_cast<int>(row.size())));
+  replace_row(s, row);
 }
 
-void GranuleStore::read_tail(int s, std::vector<std::uint64_t>& out) const {
-  const PackedRows::Place row = row_at(s);
-  const int length = rows_.length(row);
-  const std::uint64_t word_0 = tag_word(tag_at(s));
-  std::uint64_t words = 0;
-  rows_.get_some(row, word_0, record_begin - 1, record_begin, &words);
-  words >>= tail_shift;
-  out.resize(words);
-  if (words) rows_.get_some(row, word_0, length - static_cast<int>(words), length, out.data());
-}
-
-void GranuleStore::write_tail(int s, const std::vector<std::uint64_t>& tail) {
-  std::vector<std::uint64_t> row = row_of(s);
-  row.resize(row.size() - tail_of(row));
-  row.insert(row.end(), tail.begin(), tail.end());
-  std::uint64_t& last = row[record_begin - 1];
-  last = (last & ((std::uint64_t{1} << tail_shift) - 1)) | static_cast<std::uint64_t>(tail.size()) << tail_shift;
-  rows_.drop(row_at(s));
-  set_row(s, rows_.put(row.data(), static_cast<int>(row.size())));
+/// It keeps its tail.
+void GranuleStore::replace_row(int s, const std::vector<std::uint64_t>& row) {
+  const PackedRows::Place old = row_at(s);
+  const PackedRows::Place place = rows_.put(row.data(), static_cast<int>(row.size()), rows_.tail(old));
+  rows_.drop(old);
+  set_row(s, place);
 }
 
 bool GranuleStore::transient_known(std::int64_t tag) const { return transient_.of_tag.contains(narrow_tag(tag)); }

@@ -76,7 +76,7 @@ class GranuleStore {
   /// Takes a granule in. A tag that is in the store already, or that is no 32-bit number, is a std::logic_error. The words of
   /// the record at the indices `transient` are kept until forget_transient() and are 0.0 afterwards. tail: see tail().
   void add(const StoredGranule& granule, const double* record, int length, const std::vector<int>& transient = {},
-           const std::vector<std::uint64_t>& tail = {});
+           WordView tail = {});
   /// Takes it out; `record` receives its doubles. A tag that is not there is a std::logic_error.
   StoredGranule take(std::int64_t tag, std::vector<double>& record);
 
@@ -91,11 +91,13 @@ class GranuleStore {
   /// Another record for a granule that stays as it is; the words at the indices `transient` become 0.0, unless they are known
   /// still. Likewise.
   void set_record(std::int64_t tag, int layout, std::vector<double> record, const std::vector<int>& transient);
-  /// Some words more, none at first; they go with it and are lost when it is taken out. Likewise.
-  void tail(std::int64_t tag, std::vector<std::uint64_t>& out) const { read_tail(slot_or_throw(tag), out); }
-  void tail(const Resident& g, std::vector<std::uint64_t>& out) const { read_tail(slot_of(g), out); }
-  void set_tail(std::int64_t tag, const std::vector<std::uint64_t>& tail) { write_tail(slot_or_throw(tag), tail); }
-  void set_tail(const Resident& g, const std::vector<std::uint64_t>& tail) { write_tail(slot_of(g), tail); }
+  /// Some words more, none at first; they go with it and are lost when it is taken out. They stay where they are until they are
+  /// set anew. Likewise.
+  WordView tail(const Resident& g) const { return rows_.tail(row_at(slot_of(g))); }
+  void set_tail(const Resident& g, WordView tail) {
+    const int s = slot_of(g);
+    set_row(s, rows_.with_tail(row_at(s), tail));
+  }
   bool transient_known(std::int64_t tag) const;          ///< it has transient words that are not forgotten yet
   void forget_transient() { transient_ = Transient(); }  ///< costs what was added since the last call
 
@@ -174,7 +176,7 @@ class GranuleStore {
     for (; from < all && most > 0; ++from) {
       if (tag_at(from) == free_mark) continue;
       const std::vector<std::uint64_t> row = row_of(from);
-      visit(granule(from), row.data() + record_begin, static_cast<int>(row.size() - record_begin - tail_of(row)));
+      visit(granule(from), row.data() + record_begin, static_cast<int>(row.size() - record_begin));
       --most;
     }
     return from;
@@ -217,8 +219,8 @@ class GranuleStore {
  private:
   static constexpr int none = -1;
   static constexpr std::int32_t free_mark = INT32_MIN;
-  /// A granule's row: what head_of_row() says, then its engine record, then its tail. Tag, radius and mass come first, as key
-  /// words.
+  /// A granule's row: what head_of_row() says, then its engine record; its tail stands behind. Tag, radius and mass come first,
+  /// as key words.
   static constexpr int record_begin = 10;
   using Head = std::array<std::uint64_t, record_begin>;
   /// The words of a slot: 44, 36 or 28 bytes.
@@ -356,16 +358,13 @@ class GranuleStore {
   }
   bool is_taken(int frame, const Vec3& site) const;
   Resident resident(int s) const;
-  Head head_of_row(const StoredGranule& g, std::size_t tail) const;
+  Head head_of_row(const StoredGranule& g) const;
   std::vector<std::uint64_t> row_of(int s) const;
   Vec3 rounded(const Vec3& place, double radius) const;
-  static constexpr int tail_shift = 33;  // of its length in the last word of the head
-  static std::size_t tail_of(const std::vector<std::uint64_t>& row) { return row[record_begin - 1] >> tail_shift; }
   StoredGranule granule(int s) const;
   void read_record(int s, std::vector<double>& out) const;
   void change(int s, const StoredGranule& before, const StoredGranule& after);
-  void read_tail(int s, std::vector<std::uint64_t>& out) const;
-  void write_tail(int s, const std::vector<std::uint64_t>& tail);
+  void replace_row(int s, const std::vector<std::uint64_t>& row);
 
   // in and out of a grid; a body's count and box
   void seat(int s, int frame);

@@ -1,13 +1,12 @@
-// Contacts between two granules of a compact store. Their places tell what touches what, and the histories wait in few bits in
-// the tails of the store's rows: no graph is needed inside.
+// Contacts between two stored granules. They wait in the tails of the store's rows, where they take less than in a graph.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "granule_store.h"
-#include "packed_history.h"
 #include "solid_bodies.h"
 
 namespace solidcull {
@@ -49,37 +48,41 @@ class ContactList {
   std::vector<double> numbers_;
 };
 
-/// The history of a contact is in the tail of the one of the two granules that was stored later. Local to the rank; frames are
+/// What is known of a contact is in the tail of the one of the two granules that was stored later. Local to the rank; frames are
 /// those of the bodies.
 class InnerContacts {
  public:
   using Tail = std::vector<std::uint64_t>;
 
   InnerContacts(GranuleStore& store, const SolidBodies& bodies) : store_(store), bodies_(bodies) {}
+  InnerContacts(const InnerContacts&) = delete;
+  virtual ~InnerContacts() = default;
   /// As FrozenContacts::set_layout() and set_vectors() have them.
-  void set_layout(const std::vector<bool>& flips, const std::vector<int>& vectors);
+  virtual void set_layout(const std::vector<bool>& flips, const std::vector<int>& vectors) = 0;
   /// Adds the partners of a stored granule that are stored too; none for a granule that is not stored.
-  void find(std::int64_t tag, std::vector<std::int64_t>& partners) const;
-  /// Contacts of g, which is about to be stored: appends to `tail` what its row keeps of them. Returns for each whether it is
-  /// kept here from now on; the others belong in the graph. all_given: no other stored granule is near it, as is known of one
-  /// that comes from a file or another rank with its contacts.
-  std::vector<char> pack(const Resident& g, const ContactList& contacts, bool all_given, Tail& tail);
-  /// g sees it; false if it has no history.
-  bool history(const Resident& g, std::int64_t partner, double* history) const;
+  virtual void find(std::int64_t tag, std::vector<std::int64_t>& partners) const = 0;
+  /// Contacts of g, which is about to be stored: appends to `tail`, which is empty, what its row keeps of them. Returns for each
+  /// whether it is kept here from now on; the others belong in the graph. all_given: no other stored granule is near it, as is
+  /// known of one that comes from a file or another rank with its contacts.
+  virtual std::vector<char> pack(const Resident& g, const ContactList& contacts, bool all_given, Tail& tail) = 0;
+  /// Of a contact that find() finds, as g sees it; false if it has no history.
+  virtual bool history(const Resident& g, std::int64_t partner, double* history) const = 0;
   /// g is about to leave the store: adds its contacts with stored granules to `contacts`, and forgets them.
-  void unpack(const Resident& g, ContactList& contacts);
+  virtual void unpack(const Resident& g, ContactList& contacts) = 0;
   /// The histories inside this body turn; places are still those of before.
-  void turn(int body, const Eigen::Matrix3d& by);
+  virtual void turn(int body, const Eigen::Matrix3d& by) = 0;
 
- private:
-  static constexpr std::size_t nowhere = SIZE_MAX;
-  std::size_t place_in(const Tail& list, std::int64_t partner) const;
-  void erase(Tail& list, std::size_t at) const;
-  void forget_alike(const Resident& keeper, std::int64_t tag);
+ protected:
   std::size_t width() const { return flips_.size(); }
   void change_side(double* history) const {
     for (std::size_t d = 0; d < width(); ++d)
       if (flips_[d]) history[d] = -history[d];
+  }
+  void turn(double* history, const Eigen::Matrix3d& by) const {
+    for (const int v : vectors_) {
+      Eigen::Map<Vec3> vector(history + v);
+      vector = by * Vec3(vector);
+    }
   }
   /// From a to the image of b that it touches, in the frame of their body.
   Vec3 apart(const Resident& a, const Resident& b) const;
@@ -88,7 +91,6 @@ class InnerContacts {
   const SolidBodies& bodies_;
   std::vector<bool> flips_;
   std::vector<int> vectors_;
-  PackedHistory packed_;
 };
 
 }  // namespace solidcull

@@ -112,7 +112,7 @@ void PackedHistory::unpack(const std::uint64_t* packed, const Vec3& normal, doub
 
 bool PackedHistory::alike(std::int64_t a, std::int64_t b) { return key_of(a) == key_of(b); }
 
-std::size_t PackedHistory::find(const std::vector<std::uint64_t>& list, std::int64_t partner) const {
+std::size_t PackedHistory::find(WordView list, std::int64_t partner) const {
   const std::uint64_t key = key_of(partner);
   for (std::size_t at = 0; at < list.size(); at += words())
     if ((list[at] & 0xffff) == key) return at;

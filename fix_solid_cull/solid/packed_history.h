@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sphere.h"
+#include "word_view.h"
 
 namespace solidcull {
 
@@ -25,7 +26,7 @@ class PackedHistory {
   /// Two partners whose packed histories find() would confuse.
   static bool alike(std::int64_t a, std::int64_t b);
   /// Where that of `partner` begins in a list of packed histories, its size if there is none.
-  std::size_t find(const std::vector<std::uint64_t>& list, std::int64_t partner) const;
+  std::size_t find(WordView list, std::int64_t partner) const;
 
  private:
   struct Unit {

@@ -5,6 +5,8 @@
 #include <set>
 
 #include "contacts_in_store.h"
+#include "exact_contacts.h"
+#include "rounded_contacts.h"
 
 namespace solidcull {
 namespace {
@@ -29,19 +31,24 @@ void Solid::open_store() {
         cell, scales_.compact() ? GranuleStore::Precision::rounded : GranuleStore::Precision::exact);
   }
   bodies_.set_elsewhere([this](std::int64_t tag) { return store_->body_of(tag); });
-  if (scales_.refills())
+  if (scales_.refills()) {
     contacts_.set_elsewhere([this](std::int64_t tag, std::vector<std::int64_t>& partners) {
       contacts_in_store(*store_, bodies_, tag, gap_between_sites, partners);
     });
-  if (!scales_.compact()) return;
-  inner_ = std::make_unique<InnerContacts>(*store_, bodies_);
+    return;
+  }
+  if (scales_.compact())
+    inner_ = std::make_unique<RoundedContacts>(*store_, bodies_);
+  else
+    inner_ = std::make_unique<ExactContacts>(*store_, bodies_);
   inner_->set_layout(contacts_.layout(), contacts_.vectors());
   contacts_.set_elsewhere([this](std::int64_t tag, std::vector<std::int64_t>& partners) { inner_->find(tag, partners); });
 }
 
 bool Solid::set_histories(const std::vector<bool>& flips, const std::vector<int>& vectors) {
-  const bool in_use = contacts_.size() > 0 || (inner_ && store_->size() > 0);
-  if (in_use && flips != contacts_.layout()) return false;
+  const bool stored = inner_ && store_->size() > 0;
+  if ((contacts_.size() > 0 || stored) && flips != contacts_.layout()) return false;
+  if (stored && vectors != contacts_.vectors()) return false;
   contacts_.set_layout(flips);
   contacts_.set_vectors(vectors);
   if (inner_) inner_->set_layout(flips, vectors);
@@ -181,18 +188,18 @@ void Solid::leave_rank(std::int64_t tag) {
 
 // ------------------------------------------------------------------------------------------------------------ the store
 
-/// What a compact store keeps of the contacts of g leaves the graph: for its row's tail.
+/// What the store keeps of the contacts of g leaves the graph: for its row's tail.
 InnerContacts::Tail Solid::take_from_graph(const StoredGranule& g, bool all_given) {
   InnerContacts::Tail tail;
   if (!inner_) return tail;
   ContactList contacts(contacts_.width());
-  contacts_.for_each_here(g.tag, [&](std::int64_t partner, const double* history) { contacts.add(partner, history); });
+  contacts_.for_each_here(g.tag, [&](std::int64_t partner, const double* history) {
+    if (const auto stored = store_->find(partner)) contacts.add(partner, history, &*stored);
+  });
   if (contacts.size() == 0) return tail;
   const std::vector<char> kept = inner_->pack({g.position, g.radius, g.tag, g.body}, contacts, all_given, tail);
-  std::vector<std::int64_t> gone;
-  for (std::size_t k = 0; k < contacts.size(); ++k)
-    if (kept[k]) gone.push_back(contacts.partner(k));
-  contacts_.drop(g.tag, [&](std::int64_t partner) { return std::find(gone.begin(), gone.end(), partner) != gone.end(); });
+  std::size_t k = 0;  // in the same order
+  contacts_.drop(g.tag, [&](std::int64_t partner) { return k < contacts.size() && contacts.partner(k) == partner && kept[k++]; });
   return tail;
 }
 
@@ -207,7 +214,7 @@ void Solid::entered_store(std::int64_t tag) {
 
 void Solid::enter_store(std::int64_t tag) {
   const InnerContacts::Tail tail = take_from_graph(store_->get(tag), true);
-  if (!tail.empty()) store_->set_tail(tag, tail);
+  if (!tail.empty()) store_->set_tail(*store_->find(tag), tail);
   entered_store(tag);
 }
 

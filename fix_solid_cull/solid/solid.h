@@ -88,7 +88,7 @@ class Solid {
   double kinetic_energy(int body) const;
   /// Counts how often stored granules came to stand still in other ways than by being put away.
   int standing_version() const { return standing_version_; }
-  /// History of a contact inside a compact store, as g sees it; false if it has none.
+  /// History of a contact between two stored granules that is not in the graph, as g sees it; false if it has none.
   bool inner_history(const Resident& g, std::int64_t partner, double* history) const {
     return inner_ && inner_->history(g, partner, history);
   }
@@ -193,7 +193,7 @@ class Solid {
   std::unique_ptr<GranuleStore> store_;
   FrozenContacts contacts_;
   SolidBodies bodies_;
-  std::unique_ptr<InnerContacts> inner_;  // of a compact store
+  std::unique_ptr<InnerContacts> inner_;  // but for `store none`
   FrozenWallLoads wall_loads_;            // of stored granules
   Ledger ledger_;
   std::vector<double> largest_radius_by_type_;

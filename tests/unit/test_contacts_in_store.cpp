@@ -270,7 +270,7 @@ TEST(ContactsInStore, a_granule_of_a_few_kinds_takes_no_more_than_68_bytes_in_al
       const double own[6] = {0, load(random), load(random), 0, load(random), load(random)};
       packed.pack(tag + k, own, Vec3(1, 0, 0), tail);
     }
-    p.store.set_tail(tag, tail);
+    p.store.set_tail(*p.store.find(tag), tail);
   }
   p.contacts.fit();
   p.bodies.fit();

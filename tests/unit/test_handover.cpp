@@ -62,11 +62,19 @@ struct Whole {
       parts.solid.store().record(g.tag, record);
       colour += record.back();
     });
-    parts.solid.contacts().for_each_contact([&](std::int64_t low, std::int64_t high, const double* h) {
+    const auto contact = [&](std::int64_t low, std::int64_t high, const double* h) {
       const int body = bodies.body_of(low) ? bodies.body_of(low) : bodies.body_of(high);
       const Vec3 history = h ? Vec3(bodies.pose(body).turn() * vec(h)) : Vec3(Vec3::Zero());
       const auto known = contacts.emplace(std::make_pair(low, high), history);
       EXPECT_LT((known.first->second - history).norm(), 1e-15);  // on both sides of a border
+    };
+    parts.solid.contacts().for_each_contact(contact);
+    parts.solid.store().for_each([&](const Resident& g) {
+      parts.solid.contacts().for_each_elsewhere(g.tag, [&](std::int64_t partner) {
+        double h[3];
+        if (partner < g.tag) return;
+        contact(g.tag, partner, parts.solid.inner_history(g, partner, h) ? h : nullptr);
+      });
     });
     for (const auto& b : bodies.bodies()) keys.insert(parts.groups.key_of(b.first));
   }

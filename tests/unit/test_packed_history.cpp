@@ -127,12 +127,12 @@ TEST(PackedHistory, the_store_keeps_them_with_a_granule_and_lets_its_record_be) 
     g.position = Vec3(tag, 0, 0);
     store.add(g, record.data(), 4, {1, 2});
     Words tail(static_cast<std::size_t>(tag % 7), static_cast<std::uint64_t>(-tag));
-    store.set_tail(tag, tail);
+    store.set_tail(*store.find(tag), tail);
   }
   for (const bool known : {true, false}) {
     for (int tag = 1; tag <= 100; ++tag) {
-      Words tail;
-      store.tail(tag, tail);
+      const WordView is = store.tail(*store.find(tag));
+      const Words tail(is.begin(), is.end());
       EXPECT_EQ(tail, Words(static_cast<std::size_t>(tag % 7), static_cast<std::uint64_t>(-tag)));
       store.record(tag, back);
       EXPECT_EQ(back, known ? record : (std::vector<double>{1.5, 0, 0, 4.5}));
@@ -142,7 +142,7 @@ TEST(PackedHistory, the_store_keeps_them_with_a_granule_and_lets_its_record_be) 
     store.merge(2, 1, [](StoredGranule& g) { g.load_change[0] = 0; });
     store.forget_transient();
   }
-  store.set_tail(3, {});
+  store.set_tail(*store.find(3), {});
   store.take(3, back);
   EXPECT_EQ(back, (std::vector<double>{1.5, 0, 0, 4.5}));
 }
