@@ -36,6 +36,7 @@ void Culling::change() {
     open_for_insertion_ = false;  // nothing is culled, and nothing is to be
     return;
   }
+  if (phase_ == Phase::stepping) p_.ports.memory.make_room(proposal_.chosen.size());
   p_.refill.begin_change();
   MembershipChange c(p_.for_change(), p_.wake.take(p_.ports.ranks, p_.scales.wake_up()), proposal_.take());
   const bool changes = p_.ports.ranks.any(c.any_here() || p_.grounding.lets_go() || open_for_insertion_);

@@ -78,7 +78,7 @@ class Parcels {
   void take(const Parcel* parcels, std::size_t n);
   void end_taking();
 
-  /// Everything as it was, to the last bit, on the rank that wrote it: first its bodies, then its parcels, in the order in which
+  /// Everything as it was on the rank that wrote it: first its bodies, then its parcels, in the order in which
   /// they were written. Local, but for the end.
   void begin_as_it_was(const Sender& sender);
   void take_as_it_was(const Parcel& parcel);

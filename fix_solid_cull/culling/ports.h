@@ -319,6 +319,11 @@ class Memory {
  public:
   virtual ~Memory() = default;
   virtual void freed(std::size_t bytes) = 0;    ///< so many bytes more: may give them back to the system
+  /// A change begins that takes so many granules in: what the engine makes anew after it is given up first, where that is much.
+  virtual void make_room(std::size_t granules) = 0;
+  /// Many granules go in, and more will until so many owned atoms are left: arrays are cut to those that are there, but stay
+  /// too_large() for the end if they were.
+  virtual void give_rows_back(int left) = 0;
   virtual bool too_large() const = 0;           ///< arrays are far larger than the atoms need
   virtual void fit() = 0;                       ///< cuts them. While membership changes, not at the start of a run
   virtual void fit_bins(bool some_stored) = 0;  ///< likewise: wider search bins where few atoms are left

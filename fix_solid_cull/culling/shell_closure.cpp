@@ -22,6 +22,8 @@ constexpr double store_share = 0.05;
 constexpr int builds_between_storing = 4;
 // at a look: for this share of all atoms that might go to the store, at once
 constexpr double worth_of_a_build = 0.05, least_worth = 10;
+// so many granules go to the store before the engine's arrays are cut, which would hold them and the store else
+constexpr std::size_t rows_at_once = 100000;
 // walls are looked at again when a body has moved by this many skins; what is nearer than that and a margin becomes an atom
 constexpr double wall_check_in_skins = 0.25;
 constexpr double wall_gap_in_skins = 1.5;
@@ -440,7 +442,11 @@ std::size_t ShellClosure::store_what_is_deep(bool locked_now, bool membership_ch
   // where nothing else changes, a few wait for more
   if (!membership_changes && static_cast<double>(deep.size()) < store_share * ports_.atoms.owned) return 0;
   if (scales_.refills()) return put_away_at_sites(deep, surroundings);
-  for (const int i : deep) exchange_.put_away(i);
+  const int left = ports_.atoms.owned - static_cast<int>(deep.size());
+  for (std::size_t k = 0; k < deep.size(); ++k) {
+    exchange_.put_away(deep[k]);
+    if ((k + 1) % rows_at_once == 0) ports_.memory.give_rows_back(left);
+  }
   return deep.size();
 }
 

@@ -115,13 +115,21 @@ void renew_pages(LAMMPS_NS::FixContactHistory& fix, int one_atom, int page) {
   (fix.*member(HistoryPages()))->init(one_atom * std::max(1, fix.get_dnum()), page);
 }
 
-void shrink_lists(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Memory& memory, int atoms) {
+void empty_lists(LAMMPS_NS::Neighbor& neighbor) {
   for (int l = 0; l < neighbor.nlist; ++l) {
     LAMMPS_NS::NeighList* list = neighbor.lists[l];
     if (!list || !list->growflag) continue;
     if (list->ipage) list->ipage->init(list->oneatom, list->pgsize);
     if (list->dpage) list->dpage->init(list->dnum * list->oneatom, list->dnum * list->pgsize);
     list->inum = 0;
+  }
+}
+
+void shrink_lists(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Memory& memory, int atoms) {
+  empty_lists(neighbor);
+  for (int l = 0; l < neighbor.nlist; ++l) {
+    LAMMPS_NS::NeighList* list = neighbor.lists[l];
+    if (!list || !list->growflag) continue;
     list->*member(ListAtoms()) = 0;
     list->grow(atoms);
   }

@@ -63,7 +63,9 @@ LAMMPS_NS::FixMeshSurface* counting_mesh(const LAMMPS_NS::Fix* fix);
 void expect_atoms(LAMMPS_NS::Thermo& thermo, long change);
 /// Empties the pages that hold contact histories, for so many contacts of one atom and in a page.
 void renew_pages(LAMMPS_NS::FixContactHistory& fix, int one_atom, int page);
-/// Empties all neighbour lists and cuts their arrays to so many atoms.
+/// Neighbour lists name no pair, and give back the pages that pairs and their histories were in.
+void empty_lists(LAMMPS_NS::Neighbor& neighbor);
+/// Likewise, and cuts their arrays to so many atoms.
 void shrink_lists(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Memory& memory, int atoms);
 /// Arrays of one number per atom that serve sorting, binning and the atom map, cut to Atom::nmax. Not between the engine's sort
 /// and its neighbour build.

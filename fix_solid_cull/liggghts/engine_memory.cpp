@@ -32,9 +32,22 @@ constexpr double wider_neighbor = 2, wider_sort = 4;           // triangles look
 
 }  // namespace
 
-bool EngineMemory::too_large() const {
-  return atom->nmax > worth_the_trouble && atom->nmax > 2 * room * (atom->nlocal + atom->nghost / 2 + 1000);
+void EngineMemory::make_room(std::size_t granules) {
+  if (granules < static_cast<std::size_t>(worth_the_trouble)) return;
+  engine::empty_lists(*neighbor);
+  malloc_trim(0);
 }
+
+int EngineMemory::fair(int left) const { return std::max(worth_the_trouble, 2 * room * (left + atom->nghost / 2 + 1000)); }
+
+void EngineMemory::give_rows_back(int left) {
+  const int rows = std::max(atom->nlocal, fair(left) + 1);
+  if (rows >= atom->nmax) return;
+  atom->avec->grow(rows);
+  atoms_.renew();
+}
+
+bool EngineMemory::too_large() const { return atom->nmax > fair(atom->nlocal); }
 
 void EngineMemory::fit() {
   const int fitting = room * (atom->nlocal + 1000);

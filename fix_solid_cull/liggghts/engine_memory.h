@@ -18,6 +18,9 @@ class EngineMemory : public Memory, protected LAMMPS_NS::Pointers {
   EngineMemory(LAMMPS_NS::LAMMPS* lmp, EngineAtoms& atoms, EngineContacts& contacts)
       : Pointers(lmp), atoms_(atoms), contacts_(contacts) {}
 
+  /// Neighbour lists and the histories in them, a third of what a bed takes.
+  void make_room(std::size_t granules) override;
+  void give_rows_back(int left) override;
   bool too_large() const override;
   void fit() override;
   /// What lies between living blocks goes back to the system once it is much.
@@ -31,6 +34,9 @@ class EngineMemory : public Memory, protected LAMMPS_NS::Pointers {
   void give_bins_back() override;
 
  private:
+  /// The most atoms for which arrays are no larger than they should be where so many are left.
+  int fair(int left) const;
+
   EngineAtoms& atoms_;
   EngineContacts& contacts_;
   std::size_t freed_ = 0;  // since the last trim

@@ -1,6 +1,5 @@
 #include "exact_contacts.h"
 
-
 #include "contacts_in_store.h"
 #include "solid_state.h"
 

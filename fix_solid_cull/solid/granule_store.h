@@ -1,4 +1,4 @@
-// The granule store: interior granules, deleted from the engine, kept to the last bit (DESIGN section 9).
+// The granule store: interior granules, deleted from the engine, their records kept to the last bit (DESIGN section 9).
 #pragma once
 
 #include <array>

@@ -91,6 +91,7 @@ TEST(Culling, a_column_at_rest_is_culled_before_the_first_step_and_stays_where_i
   EXPECT_EQ(column.value(exterior), 12);
   world.steps(&column.culling, 1);
   EXPECT_EQ(column.value(culled), 12);
+  EXPECT_EQ(world.memory.room_for, 12u);  // was made first
   world.steps(&column.culling, 108);
   column.expect_all_counted(12);
   EXPECT_EQ(column.value(bodies), 1);
