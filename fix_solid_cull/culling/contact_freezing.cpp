@@ -1,7 +1,10 @@
 #include "contact_freezing.h"
 
 #include <algorithm>
+#include <numeric>
 #include <tuple>
+
+#include "chunked_array.h"
 
 namespace solidcull {
 
@@ -95,18 +98,18 @@ void ContactFreezing::thaw(const Changes& changes) {
   std::sort(freed.begin(), freed.end());
   struct Given {
     int atom;
-    std::int64_t partner;
-    std::size_t history;
+    std::int32_t partner;
   };
-  std::vector<Given> given;
-  std::vector<double> histories;
   const FrozenContacts& frozen = solid_.contacts();
   const std::size_t width = frozen.width();
+  ChunkedArray<Given> given;              // millions where a large bed is restored
+  ChunkedArray<double> histories(width);  // in step with them
   const auto give = [&](const int* atom, std::int64_t partner, const double* history) {
     if (!atom) return static_cast<double*>(nullptr);
-    given.push_back({*atom, partner, histories.size()});
-    histories.insert(histories.end(), history, history + width);
-    return &histories[given.back().history];
+    given[given.append()] = {*atom, static_cast<std::int32_t>(partner)};
+    double* const numbers = histories.row(histories.append());
+    std::copy(history, history + width, numbers);
+    return numbers;
   };
   const SolidBodies& bodies = solid_.bodies();
   for (const std::int64_t tag : freed) {
@@ -124,19 +127,22 @@ void ContactFreezing::thaw(const Changes& changes) {
   }
   if (scales_.refills()) {
     kept_.clear();
-    for (const Given& g : given) kept_.insert(ordered(ports_.atoms.tag[g.atom], g.partner));
+    for (std::size_t g = 0; g < given.size(); ++g) kept_.insert(ordered(ports_.atoms.tag[given[g].atom], given[g].partner));
     const HistoryRows rows = ports_.contacts.histories();
     for (const std::int64_t tag : freed)
       if (const int* i = index_.find(tag))
         rows.for_each_partner(*i, [&](std::int64_t partner, const double*) { kept_.insert(ordered(tag, partner)); });
   }
-  std::sort(given.begin(), given.end(),
-            [](const Given& a, const Given& b) { return std::tie(a.atom, a.history) < std::tie(b.atom, b.history); });
+  std::vector<std::uint32_t> by_atom(given.size());
+  std::iota(by_atom.begin(), by_atom.end(), 0u);
+  std::sort(by_atom.begin(), by_atom.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return std::tie(given[a].atom, a) < std::tie(given[b].atom, b); });
   std::vector<Contacts::History> of_one;
-  for (std::size_t g = 0; g < given.size();) {
-    const int atom = given[g].atom;
+  for (std::size_t g = 0; g < by_atom.size();) {
+    const int atom = given[by_atom[g]].atom;
     of_one.clear();
-    for (; g < given.size() && given[g].atom == atom; ++g) of_one.push_back({given[g].partner, &histories[given[g].history]});
+    for (; g < by_atom.size() && given[by_atom[g]].atom == atom; ++g)
+      of_one.push_back({given[by_atom[g]].partner, histories.row(by_atom[g])});
     ports_.contacts.give_histories(atom, of_one.data(), of_one.size());
   }
   thawed_ = changes.freed_anywhere;

@@ -318,7 +318,7 @@ class Run {
 class Memory {
  public:
   virtual ~Memory() = default;
-  virtual void freed(std::size_t bytes) = 0;    ///< so many bytes more: may give them back to the system
+  virtual void freed(std::size_t bytes) = 0;  ///< so many bytes more: may give them back to the system
   /// A change begins that takes so many granules in: what the engine makes anew after it is given up first, where that is much.
   virtual void make_room(std::size_t granules) = 0;
   /// Many granules go in, and more will until so many owned atoms are left: arrays are cut to those that are there, but stay

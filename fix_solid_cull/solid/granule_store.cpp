@@ -149,8 +149,17 @@ StoredGranule GranuleStore::take(std::int64_t tag, std::vector<double>& record) 
   set_field(s, next_field, first_free_);
   first_free_ = s;
   mass_ -= g.mass;
-  if (--size_ == 0) mass_ = ExactSum();
+  if (--size_ == 0) give_room_back();
   return g;
+}
+
+/// Of a store that is empty: when a large bed is restored its contacts need that room.
+void GranuleStore::give_room_back() {
+  mass_ = ExactSum();
+  slots_.clear();
+  first_free_ = none;
+  rows_ = PackedRows();
+  index_ = {};
 }
 
 Resident GranuleStore::resident(int s) const {

@@ -365,6 +365,7 @@ class GranuleStore {
   void read_record(int s, std::vector<double>& out) const;
   void change(int s, const StoredGranule& before, const StoredGranule& after);
   void replace_row(int s, const std::vector<std::uint64_t>& row);
+  void give_room_back();
 
   // in and out of a grid; a body's count and box
   void seat(int s, int frame);

@@ -102,6 +102,32 @@ struct Heap {
   }
 };
 
+TEST(GranuleStore, gives_its_room_back_when_it_is_empty_and_takes_in_again) {
+  GranuleStore store(0.003);
+  const std::size_t empty = store.memory_bytes();
+  std::vector<double> record(20, 1.5), back;
+  for (int round = 0; round < 2; ++round) {
+    for (int tag = 1; tag <= 5000; ++tag) {
+      StoredGranule g;
+      g.tag = tag;
+      g.position = 1e-3 * Vec3(tag % 20, tag / 20 % 20, tag / 400);
+      g.radius = 1e-3;
+      g.body = 1;
+      record[3] = tag;
+      store.add(g, record.data(), static_cast<int>(record.size()));
+    }
+    EXPECT_EQ(store.size(), 5000u);
+    const std::size_t full = store.memory_bytes() - empty;
+    EXPECT_GT(full, 5000u * 44);
+    for (int tag = 5000; tag >= 1; --tag) {
+      EXPECT_EQ(store.take(tag, back).tag, tag);
+      EXPECT_EQ(back[3], tag);
+    }
+    EXPECT_LE(store.memory_bytes() - empty, full / 10) << "search cells stay";
+    EXPECT_FALSE(store.contains(1));
+  }
+}
+
 TEST(GranuleStore, refuses_cells_without_size) {
   EXPECT_THROW(GranuleStore(0.0), std::invalid_argument);
   EXPECT_THROW(GranuleStore(-1.0), std::invalid_argument);
