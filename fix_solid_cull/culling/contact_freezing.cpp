@@ -102,8 +102,9 @@ void ContactFreezing::thaw(const Changes& changes) {
   };
   const FrozenContacts& frozen = solid_.contacts();
   const std::size_t width = frozen.width();
-  ChunkedArray<Given> given;              // millions where a large bed is restored
-  ChunkedArray<double> histories(width);  // in step with them
+  constexpr std::size_t chunk_bytes = 4096;  // some hundred are given as a rule, millions where a large bed is restored
+  ChunkedArray<Given> given(1, chunk_bytes);
+  ChunkedArray<double> histories(width, chunk_bytes);  // in step with them
   const auto give = [&](const int* atom, std::int64_t partner, const double* history) {
     if (!atom) return static_cast<double*>(nullptr);
     given[given.append()] = {*atom, static_cast<std::int32_t>(partner)};

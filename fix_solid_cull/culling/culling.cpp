@@ -84,6 +84,7 @@ void Culling::find_scales() {
   if (p_.solid.has_store()) return;
   if (p_.scales.image_by_place()) refuse_what_lies_too_far();
   p_.solid.open_store();
+  if (Invariants::asked()) p_.solid.pack_contacts_from(0);  // so that small scenes try it too
 }
 
 void Culling::set_up_atoms() {

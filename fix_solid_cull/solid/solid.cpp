@@ -191,7 +191,7 @@ void Solid::leave_rank(std::int64_t tag) {
 /// What the store keeps of the contacts of g leaves the graph: for its row's tail.
 InnerContacts::Tail Solid::take_from_graph(const StoredGranule& g, bool all_given) {
   InnerContacts::Tail tail;
-  if (!inner_) return tail;
+  if (!inner_ || (!scales_.compact() && store_->size() < pack_from_)) return tail;
   ContactList contacts(contacts_.width());
   contacts_.for_each_here(g.tag, [&](std::int64_t partner, const double* history) {
     if (const auto stored = store_->find(partner)) contacts.add(partner, history, &*stored);

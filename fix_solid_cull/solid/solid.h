@@ -46,6 +46,9 @@ class Solid {
   /// Search cells take their size from the scales, which are known by now.
   void open_store();
   bool has_store() const { return store_ != nullptr; }
+  /// An exact store of fewer granules than this leaves their contacts in the graph: in so small a bed packing them costs time and
+  /// saves next to nothing. What is packed, or is not, stays so.
+  void pack_contacts_from(std::size_t granules) { pack_from_ = granules; }
   /// Edges of the periodic box, 0 where it is not periodic (m).
   void set_periods(const Vec3& edges) { bodies_.set_periods(edges); }
   /// Layout of the contact histories: which change sign with the side, which are vectors. False, and nothing happens, if another
@@ -194,6 +197,7 @@ class Solid {
   FrozenContacts contacts_;
   SolidBodies bodies_;
   std::unique_ptr<InnerContacts> inner_;  // but for `store none`
+  std::size_t pack_from_ = 15000;         // granules: three megabytes of contacts
   FrozenWallLoads wall_loads_;            // of stored granules
   Ledger ledger_;
   std::vector<double> largest_radius_by_type_;

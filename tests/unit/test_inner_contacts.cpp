@@ -42,6 +42,7 @@ struct Packing {
     solid.set_types(1);
     solid.set_periods(periods);
     solid.open_store();
+    solid.pack_contacts_from(0);
     SolidBody b;
     b.grounded = true;
     body = solid.found(b);
@@ -171,6 +172,7 @@ TEST_P(InnerContactsOf, a_granule_that_arrives_with_its_contacts_is_as_one_that_
   arrived.set_histories(p.solid.contacts().layout(), p.solid.contacts().vectors());
   arrived.set_types(1);
   arrived.open_store();
+  arrived.pack_contacts_from(0);
   SolidBody body;
   body.grounded = true;
   const int number = arrived.found(body);
@@ -206,6 +208,7 @@ TEST(InnerContacts, who_arrives_takes_away_what_it_would_be_confused_with) {
   solid.set_histories(p.solid.contacts().layout(), p.solid.contacts().vectors());
   solid.set_types(1);
   solid.open_store();
+  solid.pack_contacts_from(0);
   const int body = solid.found(SolidBody());
   ContactList contacts(width);
   const auto arrives = [&](std::int64_t tag, double x) {
@@ -270,6 +273,7 @@ std::size_t left_in_the_graph(double x, const std::vector<double>& history, int 
   solid.set_histories({true, true, true}, {0});
   solid.set_types(1);
   solid.open_store();
+  solid.pack_contacts_from(0);
   const int body = solid.found(SolidBody());
   StoredGranule g;
   g.tag = 1;
@@ -304,7 +308,8 @@ TEST(ExactContacts, touching_without_history_stays_that) {
   }();
   Solid solid(scales);
   solid.set_types(1);
-  solid.open_store();  // a contact model without history
+  solid.open_store();
+  solid.pack_contacts_from(0);  // a contact model without history
   StoredGranule g;
   g.body = solid.found(SolidBody());
   g.radius = 0.5;

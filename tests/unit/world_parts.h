@@ -43,6 +43,7 @@ struct WorldParts : CullingParts {
     scales.set(d, g > 0 ? g : Scales::standard_gravity);
     scales.make_laws(world.run.dt);
     solid.open_store();
+    solid.pack_contacts_from(0);
   }
 
   /// One membership change as Culling makes it, but for what goes to the store and comes out by the shell's closure. Collective.
