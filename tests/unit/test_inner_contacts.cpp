@@ -244,6 +244,20 @@ TEST(ExactContacts, vectors_out_of_the_plane_come_back_as_well) {
   }
 }
 
+TEST(ExactContacts, a_small_bed_leaves_them_in_the_graph_and_a_larger_one_packs_what_comes_then) {
+  Packing p(Store::exact, 5, 100, Vec3(4.9, 4.9, 4.9));
+  p.solid.pack_contacts_from(60);
+  const std::size_t all = p.solid.contacts().size();
+  int in = 0;
+  for (const auto& g : p.granules) {
+    p.put_away(g.first);
+    if (++in == 60) EXPECT_EQ(p.solid.contacts().size(), all);
+  }
+  EXPECT_LT(p.solid.contacts().size(), all);
+  EXPECT_GT(p.solid.contacts().size(), 0u);
+  p.expect_all_in(p.solid, p.rounding());
+}
+
 TEST(ExactContacts, coming_and_going_again_changes_no_bit) {
   Packing p(Store::exact, 6, 150, Vec3(0, 4.9, 0), 1e-4);
   std::map<std::pair<std::int64_t, std::int64_t>, Packing::Numbers> first;
