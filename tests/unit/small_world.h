@@ -286,7 +286,7 @@ class SmallMemory : public Memory {
   explicit SmallMemory(SmallWorld& world) : world_(world) {}
   void freed(std::size_t bytes) override { bytes_freed += bytes; }
   void make_room(std::size_t granules) override { room_for = std::max(room_for, granules); }
-  void give_rows_back(int left) override { rows_for = left; }
+  void give_rows_back(int) override {}
   bool too_large() const override { return large; }
   void fit() override;
   void fit_bins(bool some_stored) override { bins_wide = some_stored; }
@@ -294,7 +294,7 @@ class SmallMemory : public Memory {
 
   std::size_t bytes_freed = 0, room_for = 0;
   bool large = false, bins_wide = false;
-  int fits = 0, rows_for = -1;
+  int fits = 0;
 
  private:
   SmallWorld& world_;
