@@ -192,5 +192,30 @@ TEST(AdapterRecords, MotionWordsAreThoseOfPlaceVelocityAndSpin) {
   EXPECT_TRUE(std::includes(all.begin(), all.end(), without_places.begin(), without_places.end()));
 }
 
+// A large cull cuts the engine's arrays while it goes on: whoever kept a view of them would read what is no longer there (arrays
+// that shrink stay where they are, but for the sanitizers).
+TEST(AdapterMemory, ACullThatCutsTheEnginesArraysOnItsWayLosesNothing) {
+  // those at walls stay for a step; the others are more than go in between two cuts
+  constexpr int granules = 52 * 52 * 50;
+  Bed bed;
+  bed.side = 0.104;
+  Engine e;
+  e.run(head(bed) + "region box block 0 0.104 0 0.104 0 0.104 units box\ncreate_box 2 box\nneighbor 0.0003 bin\n" + body(bed) +
+        "unfix grav\nlattice sc 0.002 origin 0.5 0.5 0.5\nregion cube block 0 0.104 0 0.104 0 0.1 units box\n"
+        "create_atoms 1 region cube\nset group all diameter 0.002 density 2500\nfix move all nve/sphere\n"
+        "thermo_modify lost error\nrun 0\n");
+  const State before = e.state();
+  ASSERT_EQ(before.size(), static_cast<std::size_t>(granules));
+  const int room = e.lammps()->atom->nmax;
+  e.run("fix cull all solid/cull exterior sleep\nrun 2\n");
+  EXPECT_LT(e.vector("cull", 1), 0.01 * granules);
+  expect_all_there(e, "cull", granules);
+  EXPECT_LT(e.lammps()->atom->nmax, room);
+  e.run("unfix cull\nrun 0\n");
+  const State after = e.state();
+  expect_same_granules(before, after);
+  EXPECT_LT(largest_difference(before, after, &Granule::x), 1e-15);
+}
+
 }  // namespace
 }  // namespace decks
