@@ -322,8 +322,8 @@ TEST(ExactContacts, touching_without_history_stays_that) {
   }();
   Solid solid(scales);
   solid.set_types(1);
-  solid.open_store();
-  solid.pack_contacts_from(0);  // a contact model without history
+  solid.open_store();  // a contact model without history
+  solid.pack_contacts_from(0);
   StoredGranule g;
   g.body = solid.found(SolidBody());
   g.radius = 0.5;
