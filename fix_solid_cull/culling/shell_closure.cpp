@@ -442,6 +442,7 @@ std::size_t ShellClosure::store_what_is_deep(bool locked_now, bool membership_ch
   // where nothing else changes, a few wait for more
   if (!membership_changes && static_cast<double>(deep.size()) < store_share * ports_.atoms.owned) return 0;
   if (scales_.refills()) return put_away_at_sites(deep, surroundings);
+  solid_.expects(deep.size());
   const int left = ports_.atoms.owned - static_cast<int>(deep.size());
   for (std::size_t k = 0; k < deep.size(); ++k) {
     exchange_.put_away(deep[k]);

@@ -47,7 +47,7 @@ class Solid {
   void open_store();
   bool has_store() const { return store_ != nullptr; }
   /// An exact store of fewer granules than this leaves their contacts in the graph: in so small a bed packing them costs time and
-  /// saves next to nothing. What is packed, or is not, stays so.
+  /// saves next to nothing. 0: it packs all.
   void pack_contacts_from(std::size_t granules) { pack_from_ = granules; }
   /// Edges of the periodic box, 0 where it is not periodic (m).
   void set_periods(const Vec3& edges) { bodies_.set_periods(edges); }
@@ -141,6 +141,10 @@ class Solid {
   StoredGranule as_stored(const StoredGranule& g);
   /// An interface granule stands elsewhere in its body from here on (frame of the body).
   void relocate(int body, const GranuleMass& granule, const Vec3& to) { bodies_.relocate(body, granule, to); }
+  /// So many granules are about to be put away. If they are many beside what is stored, a bed comes to rest, and an exact store
+  /// packs their contacts. Few are what a wave woke and will wake again: theirs stay in the graph. What is packed, or is not,
+  /// stays so.
+  void expects(std::size_t granules);
   void put_away(const StoredGranule& g, const std::vector<double>& record, const std::vector<int>& transient,
                 const std::vector<WallLoad>& loads);
   /// It leaves the store and is an interface granule of its body again; `record` receives its engine record.
@@ -198,6 +202,7 @@ class Solid {
   SolidBodies bodies_;
   std::unique_ptr<InnerContacts> inner_;  // but for `store none`
   std::size_t pack_from_ = 15000;         // granules: three megabytes of contacts
+  bool packs_ = true;                     // what is put away now
   FrozenWallLoads wall_loads_;            // of stored granules
   Ledger ledger_;
   std::vector<double> largest_radius_by_type_;

@@ -248,13 +248,43 @@ TEST(ExactContacts, a_small_bed_leaves_them_in_the_graph_and_a_larger_one_packs_
   Packing p(Store::exact, 5, 100, Vec3(4.9, 4.9, 4.9));
   p.solid.pack_contacts_from(60);
   const std::size_t all = p.solid.contacts().size();
-  int in = 0;
-  for (const auto& g : p.granules) {
-    p.put_away(g.first);
-    if (++in == 60) EXPECT_EQ(p.solid.contacts().size(), all);
+  for (const std::int64_t upto : {59, 100}) {
+    p.solid.expects(static_cast<std::size_t>(upto) - p.stored.size());
+    for (std::int64_t tag = 1 + static_cast<std::int64_t>(p.stored.size()); tag <= upto; ++tag) p.put_away(tag);
+    if (upto == 59) EXPECT_EQ(p.solid.contacts().size(), all);
   }
   EXPECT_LT(p.solid.contacts().size(), all);
   EXPECT_GT(p.solid.contacts().size(), 0u);
+  p.expect_all_in(p.solid, p.rounding());
+}
+
+TEST(ExactContacts, a_bed_that_comes_to_rest_packs_them_and_what_a_wave_woke_leaves_them_in_the_graph) {
+  Packing p(Store::exact, 11, 100, Vec3(4.9, 4.9, 4.9));
+  p.solid.pack_contacts_from(60);
+  p.solid.expects(100);
+  for (const auto& g : p.granules) p.put_away(g.first);
+  EXPECT_EQ(p.solid.contacts().size(), 0u);
+  for (std::int64_t tag = 1; tag <= 30; ++tag) p.bring_back(tag);
+  const std::size_t woken = p.solid.contacts().size();
+  EXPECT_GT(woken, 0u);
+  p.solid.expects(30);
+  for (std::int64_t tag = 1; tag <= 30; ++tag) p.put_away(tag);
+  EXPECT_EQ(p.solid.contacts().size(), woken);
+  p.expect_all_in(p.solid, p.rounding());
+  for (std::int64_t tag = 1; tag <= 40; ++tag) p.bring_back(tag);
+  p.solid.expects(40);
+  for (std::int64_t tag = 1; tag <= 40; ++tag) p.put_away(tag);
+  EXPECT_EQ(p.solid.contacts().size(), 0u);
+  p.expect_all_in(p.solid, p.rounding());
+}
+
+TEST(CompactContacts, are_packed_by_the_handful_too) {
+  Packing p(Store::compact, 12, 100, Vec3(0, 0, 0));
+  for (const auto& g : p.granules) {
+    p.solid.expects(1);
+    p.put_away(g.first);
+  }
+  EXPECT_EQ(p.solid.contacts().size(), 0u);
   p.expect_all_in(p.solid, p.rounding());
 }
 
