@@ -216,8 +216,10 @@ void Solid::entered_store(std::int64_t tag) {
 }
 
 void Solid::enter_store(std::int64_t tag) {
-  const InnerContacts::Tail tail = take_from_graph(store_->get(tag), true);
-  if (!tail.empty()) store_->set_tail(*store_->find(tag), tail);
+  if (scales_.compact() || is_large(store_->size())) {
+    const InnerContacts::Tail tail = take_from_graph(store_->get(tag), true);
+    if (!tail.empty()) store_->set_tail(*store_->find(tag), tail);
+  }
   entered_store(tag);
 }
 
@@ -265,8 +267,8 @@ StoredGranule Solid::as_stored(const StoredGranule& g) {
 
 void Solid::expects(std::size_t granules) {
   const std::size_t stored = store_->size();
-  packs_ = scales_.compact() || pack_from_ == 0 ||
-           (stored + granules >= pack_from_ && static_cast<double>(granules) >= pack_share * static_cast<double>(stored));
+  const bool many = pack_from_ == 0 || static_cast<double>(granules) >= pack_share * static_cast<double>(stored);
+  packs_ = scales_.compact() || (many && is_large(stored + granules));
 }
 
 void Solid::put_away(const StoredGranule& g, const std::vector<double>& record, const std::vector<int>& transient,

@@ -185,6 +185,7 @@ class Solid {
  private:
   Vec3 free_site(int body, const Vec3& place, double radius) const;
   void find_grid(int body);
+  bool is_large(std::size_t granules) const { return granules >= pack_from_; }
   InnerContacts::Tail take_from_graph(const StoredGranule& g, bool all_given);
   void leaves_store(std::int64_t tag);
   void entered_store(std::int64_t tag);

@@ -251,7 +251,7 @@ TEST(ExactContacts, a_small_bed_leaves_them_in_the_graph_and_a_larger_one_packs_
   for (const std::int64_t upto : {59, 100}) {
     p.solid.expects(static_cast<std::size_t>(upto) - p.stored.size());
     for (std::int64_t tag = 1 + static_cast<std::int64_t>(p.stored.size()); tag <= upto; ++tag) p.put_away(tag);
-    if (upto == 59) EXPECT_EQ(p.solid.contacts().size(), all);
+    if (upto == 59) { EXPECT_EQ(p.solid.contacts().size(), all); }
   }
   EXPECT_LT(p.solid.contacts().size(), all);
   EXPECT_GT(p.solid.contacts().size(), 0u);
@@ -276,6 +276,19 @@ TEST(ExactContacts, a_bed_that_comes_to_rest_packs_them_and_what_a_wave_woke_lea
   for (std::int64_t tag = 1; tag <= 40; ++tag) p.put_away(tag);
   EXPECT_EQ(p.solid.contacts().size(), 0u);
   p.expect_all_in(p.solid, p.rounding());
+}
+
+TEST(ExactContacts, who_arrives_in_a_small_bed_leaves_them_in_the_graph_too) {
+  for (const std::size_t pack_from : {0, 101}) {
+    Packing p(Store::exact, 13, 100, Vec3(0, 0, 0));
+    p.solid.pack_contacts_from(pack_from);
+    const std::size_t all = p.solid.contacts().size();
+    const double record[] = {1, 2, 3};
+    for (const auto& g : p.granules) p.solid.add_stored(g.second, record, 3);
+    for (const auto& g : p.granules) p.solid.enter_store(g.first);
+    EXPECT_EQ(p.solid.contacts().size(), pack_from == 0 ? 0 : all);
+    p.expect_all_in(p.solid, p.rounding());
+  }
 }
 
 TEST(CompactContacts, are_packed_by_the_handful_too) {
