@@ -251,7 +251,9 @@ TEST(ExactContacts, a_small_bed_leaves_them_in_the_graph_and_a_larger_one_packs_
   for (const std::int64_t upto : {59, 100}) {
     p.solid.expects(static_cast<std::size_t>(upto) - p.stored.size());
     for (std::int64_t tag = 1 + static_cast<std::int64_t>(p.stored.size()); tag <= upto; ++tag) p.put_away(tag);
-    if (upto == 59) { EXPECT_EQ(p.solid.contacts().size(), all); }
+    if (upto == 59) {
+      EXPECT_EQ(p.solid.contacts().size(), all);
+    }
   }
   EXPECT_LT(p.solid.contacts().size(), all);
   EXPECT_GT(p.solid.contacts().size(), 0u);
