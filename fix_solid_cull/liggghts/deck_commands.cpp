@@ -13,6 +13,7 @@
 #include "fix_solid_cull.h"
 #include "group.h"
 #include "lammps.h"
+#include "mesh_regions.h"
 #include "modify.h"
 #include "neigh_request.h"
 #include "neighbor.h"
@@ -106,6 +107,8 @@ MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, 
   const std::vector<std::string> line(words, words + n);
   Sight sight = sight_of(command, line, added);
   if (is_own_line(command, words, n)) sight = fix ? Sight::all_restored : Sight::nothing;
+  const std::string refused = why_no_interface_mesh_for_command(lmp, command, n, words);
+  if (!refused.empty()) lmp->error->all(FLERR, refused.c_str());
   const bool reads = sight == Sight::whole_bed || sight == Sight::all_restored;
   if (reads) refuse_part_of_a_bed(lmp, fix, std::string("before '") + command + "'");
   if (sight == Sight::run && (lists_are_void(lmp) || (fix && has_commands(words, n)))) set_up_after_all(words, n);

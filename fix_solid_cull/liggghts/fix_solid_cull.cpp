@@ -14,6 +14,7 @@
 #include "error.h"
 #include "input_error.h"
 #include "interpositions.h"
+#include "mesh_regions.h"
 #include "restart_files.h"
 #include "run_failure.h"
 #include "settings.h"
@@ -147,6 +148,7 @@ void FixSolidCull::init() {
 }
 
 void FixSolidCull::setup_pre_exchange() {
+  bodies_have_changed();
   hand_on([&] { culling_->set_up_atoms(); });
 }
 
@@ -172,6 +174,7 @@ void FixSolidCull::post_integrate() {
 }
 
 void FixSolidCull::pre_exchange() {
+  bodies_have_changed();
   hand_on([&] { culling_->change(); });
   vector_atom = culling_->labels();  // arrays may have been cut
 }
@@ -215,12 +218,15 @@ void FixSolidCull::run_begins() {
   hand_on([&] {
     if (rules_.find_movable(atoms_, run_)) culling_->show_bed();  // to see who may still be culled
     culling_->hide_bed();
+    culling_->let_meshes_go();
   });
+  bodies_have_changed();
   in_run_ = true;
 }
 
 bool FixSolidCull::show_bed() {
   return hand_on([&] {
+    if (has_interface_mesh(lmp)) culling_->hold_meshes();
     const bool before = culling_->bed_is_shown();
     culling_->show_bed();
     return !before && culling_->bed_is_shown();
@@ -241,6 +247,7 @@ void FixSolidCull::hide_bed() {
 
 void FixSolidCull::restore_all(const char* command) {
   hand_on([&] {
+    if (has_interface_mesh(lmp)) culling_->hold_meshes();
     if (culling_->restore_all() > 0)
       run_.say("'" + std::string(command) + "' may change which granules there are: all are exterior now");
   });
