@@ -21,7 +21,7 @@ class Report {
   static constexpr int of_all = 6;    ///< and what all granules have together
   static constexpr int again = 2;     ///< how many were culled again, and how many of them had moved
   static constexpr int size = counts + carried + of_all + again;
-  static constexpr int interior = 2, culled_so_far = 5;  ///< indices; the first is that of f_ID itself
+  static constexpr int interior = 2;  ///< index of f_ID itself among them
 
   Report(const Ports& ports, const Solid& solid, const Shell& shell, const BodyGroups& groups, const BodyMotion& motion)
       : ports_(ports), solid_(solid), shell_(shell), groups_(groups), motion_(motion) {}

@@ -51,7 +51,9 @@ constexpr CommandStyle styles[] = {
     {"newton", nothing},
     {"next", nothing},
     {"package", nothing},
-    {"pair_*", nothing},
+    {"pair_coeff", nothing},
+    {"pair_modify", nothing},
+    {"pair_write", nothing},
     {"partition", nothing},
     {"print", nothing},
     {"processors", nothing},
@@ -91,6 +93,7 @@ constexpr CommandStyle styles[] = {
     {"write_dump", whole_bed},
 
     {"change_box", all_restored},
+    {"pair_style", all_restored},
     {"read_data", all_restored},
     {"read_dump", all_restored},
     {"read_restart", all_restored},

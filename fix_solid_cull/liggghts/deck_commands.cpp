@@ -150,8 +150,8 @@ void show(LAMMPS_NS::LAMMPS* lmp, FixSolidCull& fix, bool forces) {
 void refuse_value_of_atoms(LAMMPS_NS::LAMMPS* lmp, const std::string& formula) {
   FixSolidCull* const fix = fix_of(lmp);
   if (!fix) return;
-  const std::string missed = fix_that_missed_granules(formula, lmp);
-  if (!missed.empty() && fix->has_culled()) fix->refuse_value_of_atoms(formula, missed);
+  const std::string missed = fix_that_missed_granules(formula, lmp, [&](int groups) { return fix->culls_of(groups); });
+  if (!missed.empty()) fix->refuse_value_of_atoms(formula, missed);
 }
 
 void met_formula(LAMMPS_NS::LAMMPS* lmp, const char* formula) {

@@ -230,8 +230,6 @@ void FixSolidCull::show_bed() {
   hand_on([&] { culling_->finish_show(); });
 }
 
-bool FixSolidCull::has_culled() { return compute_vector(Report::culled_so_far) > 0; }
-
 void FixSolidCull::lend_contacts() {
   hand_on([&] { culling_->lend_contacts(); });
 }
@@ -273,7 +271,8 @@ std::string FixSolidCull::before_first_run(const std::string& where) const {
 
 void FixSolidCull::refuse_value_of_atoms(const std::string& formula, const std::string& measured_by) {
   refuse("the variable '" + formula + "' reads " + measured_by +
-         ", which has measured atoms only, and granules were culled: read what it is made of, which is computed again of all "
+         ", which has measured atoms only, without the granules that are culled: read what it is made of, which is computed "
+         "again of all "
          "granules, or one of f_" +
          id + "[23] to f_" + id + "[28]");
 }

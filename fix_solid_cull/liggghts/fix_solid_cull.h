@@ -75,7 +75,6 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   int show_number() const { return show_; }                       ///< which show of a bed it was the last time. Local
   bool bed_is_shown() const { return culling_->bed_is_shown(); }  ///< local
   std::int64_t stored() const { return culling_->stored(); }      ///< interior granules of all ranks. Local
-  bool has_culled();                                              ///< since it was made
   /// The engine computes forces of all granules between these two.
   void lend_contacts();
   void take_contacts_back();

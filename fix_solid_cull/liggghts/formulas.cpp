@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <regex>
 #include <set>
 
 #include "compute.h"
 #include "compute_styles.h"
 #include "fix.h"
 #include "fix_styles.h"
+#include "group.h"
 #include "lammps.h"
 #include "modify.h"
 
@@ -20,6 +22,9 @@ const std::set<std::string> of_no_granule = {
     "step",    "elapsed", "dt",     "time",   "cpu",       "tpcpu",   "spcpu", "part", "vol",     "elaplong", "cpuremain",
     "swiggle", "lx",      "ly",     "lz",     "vdisplace", "cwiggle", "xlo",   "xhi",  "ylo",     "yhi",      "zlo",
     "zhi",     "xy",      "xz",     "yz",     "xlat",      "ylat",    "zlat"};
+const std::set<std::string> group_functions = {"count",    "mass", "charge", "xcm",    "vcm",     "fcm",  "bound",
+                                               "gyration", "ke",   "angmom", "torque", "inertia", "omega"};
+const char* const of_group = "g_";  // before a group, among what a number is made of
 const std::set<std::string> of_forces = {"fcm", "torque", "fx", "fy", "fz", "tqx", "tqy", "tqz"};
 
 bool begins(const std::string& word, const char* with) { return word.compare(0, 2, with) == 0; }
@@ -35,33 +40,39 @@ bool is_of_motion(const std::string& style) {
 /// A number as the engine computes it in a run.
 class InRun {
  public:
-  explicit InRun(LAMMPS_NS::LAMMPS* lmp) : lmp_(lmp) {}
+  InRun(LAMMPS_NS::LAMMPS* lmp, const CullsOf& culls_of) : lmp_(lmp), culls_of_(culls_of) {}
 
   bool misses_granules(const std::string& word) {
     if (!seen_.insert(word).second) return false;  // in a circle of names, or known
     if (begins(word, "f_")) {
       const int f = lmp_->modify->find_fix(word.substr(2).c_str());
       if (f < 0) return false;
-      const std::string style = lmp_->modify->fix[f]->style;
-      return treatment_of(style).treatment == Treatment::atoms_only || (is_average(style) && any_source_of(word));
+      const LAMMPS_NS::Fix* fix = lmp_->modify->fix[f];
+      if (is_average(fix->style)) return any_source_of(word);
+      return treatment_of(fix->style).treatment == Treatment::atoms_only && culls_of_(fix->groupbit);
     }
     if (begins(word, "c_")) {
       const int c = lmp_->modify->find_compute(word.substr(2).c_str());
       if (c < 0) return false;
-      const std::string style = lmp_->modify->compute[c]->style;
-      switch (measure_of(style).measure) {
+      const LAMMPS_NS::Compute* compute = lmp_->modify->compute[c];
+      switch (measure_of(compute->style).measure) {
         case Measure::exact:
           return any_source_of(word);
         case Measure::atoms_only:
-          return !is_of_motion(style);
+          return !is_of_motion(compute->style) && culls_of_(compute->groupbit);
         case Measure::contacts:
-          return true;
+          return culls_of_(compute->groupbit);
         default:
           return false;
       }
     }
     if (begins(word, "v_")) return any_source_of(word);
-    return of_no_granule.count(word) == 0 && word != "ke";  // a function of granules
+    if (begins(word, of_group)) {
+      const int group = lmp_->group->find(word.substr(2).c_str());
+      return group >= 0 && culls_of_(lmp_->group->bitmask[group]);
+    }
+    constexpr int all = 1;
+    return of_no_granule.count(word) == 0 && word != "ke" && culls_of_(all);
   }
 
  private:
@@ -71,8 +82,24 @@ class InRun {
   }
 
   LAMMPS_NS::LAMMPS* lmp_;
+  const CullsOf& culls_of_;
   std::set<std::string> seen_;
 };
+
+/// What a formula is made of; a function of a group by the group alone.
+void add_sources(const std::string& formula, std::vector<std::string>& all) {
+  static const std::regex of_a_group(R"((^|[^\w])([a-zA-Z]+)\((\w+)(,[^()]*)?\))");
+  std::string rest;
+  auto from = formula.begin();
+  for (std::sregex_iterator m(formula.begin(), formula.end(), of_a_group), end; m != end; ++m) {
+    if (!group_functions.count((*m)[2])) continue;
+    if ((*m)[2] != "ke") all.push_back(of_group + (*m)[3].str());
+    rest += std::string(from, formula.begin() + m->position()) + " ";
+    from = formula.begin() + m->position() + m->length();
+  }
+  rest.append(from, formula.end());
+  for (const std::string& w : words_of(rest)) all.push_back(w);
+}
 
 }  // namespace
 
@@ -126,11 +153,10 @@ void Sources::was_made(const std::string& name, const std::vector<std::string>& 
     if (begins(w, "c_") || begins(w, "f_") || begins(w, "v_")) all.push_back(w.substr(0, w.find('[')));
 }
 
-void Sources::variable_was_made(const std::string& name, const std::vector<std::string>& words) {
+void Sources::variable_was_made(const std::string& name, const std::vector<std::string>& formula) {
   std::vector<std::string>& all = made_["v_" + name];
   all.clear();
-  for (const std::string& w : words)
-    for (const std::string& named : words_of(w)) all.push_back(named);
+  for (const std::string& w : formula) add_sources(w, all);
 }
 
 const std::vector<std::string>& Sources::of(const std::string& word) const {
@@ -144,8 +170,8 @@ Sources& sources(LAMMPS_NS::LAMMPS* lmp) {
   return all[lmp];
 }
 
-std::string fix_that_missed_granules(const std::string& formula, LAMMPS_NS::LAMMPS* lmp) {
-  InRun in_run(lmp);
+std::string fix_that_missed_granules(const std::string& formula, LAMMPS_NS::LAMMPS* lmp, const CullsOf& culls_of) {
+  InRun in_run(lmp, culls_of);
   for (const std::string& word : words_of(formula)) {
     if (!begins(word, "f_") || !in_run.misses_granules(word)) continue;
     const LAMMPS_NS::Fix* fix = lmp->modify->fix[lmp->modify->find_fix(word.substr(2).c_str())];

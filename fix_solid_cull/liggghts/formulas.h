@@ -42,8 +42,10 @@ class Sources {
 };
 Sources& sources(LAMMPS_NS::LAMMPS* lmp);
 
+/// Whether a culled granule may be in one of these engine groups (bits). Collective.
+using CullsOf = std::function<bool(int groups)>;
 /// The fix, as "fix ID (style)", whose value in the formula was measured in runs and of atoms only, where culled granules would
-/// count; empty: there is none. Local.
-std::string fix_that_missed_granules(const std::string& formula, LAMMPS_NS::LAMMPS* lmp);
+/// count; empty: there is none. Collective.
+std::string fix_that_missed_granules(const std::string& formula, LAMMPS_NS::LAMMPS* lmp, const CullsOf& culls_of);
 
 }  // namespace solidcull

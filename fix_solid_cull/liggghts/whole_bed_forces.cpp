@@ -112,6 +112,8 @@ void WholeBedForces::compute() {
 
 bool some_current_number_needs_forces(LAMMPS_NS::LAMMPS* lmp) {
   const LAMMPS_NS::Modify* modify = lmp->modify;
+  if (std::any_of(modify->fix, modify->fix + modify->nfix, [](const LAMMPS_NS::Fix* f) { return is(f, "store/force"); }))
+    return true;  // a number of the deck may be made of them
   return std::any_of(modify->compute, modify->compute + modify->ncompute, [&](const LAMMPS_NS::Compute* c) {
     return is_current(c, lmp->update->ntimestep) && !is_zero(c) && needs_forces(lmp, c);
   });
