@@ -4,16 +4,23 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "atom.h"
 #include "engine.h"
+#include "fix.h"
+#include "input.h"
+#include "lammps.h"
 #include "library.h"
+#include "modify.h"
 
 namespace decks {
 namespace {
@@ -267,6 +274,41 @@ TEST_F(LibraryTest, a_file) {
   MPI_Barrier(MPI_COMM_WORLD);
   for (Library* l : {&stock_, &asleep_}) lammps_file(l->handle(), "library_tests.in");
   EXPECT_NEAR(asleep_.variable("m"), stock_.variable("m"), 1e-12 * stock_.variable("m"));
+}
+
+TEST(LibraryByClasses, finds_the_whole_bed_after_each_command) {
+  const auto made = [](bool culls) {
+    std::vector<std::string> words = {"program", "-log", "none", "-screen", "library_tests.screen"};
+    std::vector<char*> args;
+    for (std::string& w : words) args.push_back(&w[0]);
+    auto lmp = std::make_unique<LAMMPS_NS::LAMMPS>(static_cast<int>(args.size()), args.data(), MPI_COMM_WORLD);
+    std::istringstream all(read_bed(bed()) + (culls ? fix_line : "") + "run 100\nrun 0\n");
+    for (std::string line; std::getline(all, line);)
+      if (!line.empty()) lmp->input->one(line.c_str());
+    return lmp;
+  };
+  const auto stock = made(false), asleep = made(true);
+  LAMMPS_NS::Fix* const fix = asleep->modify->fix[asleep->modify->find_fix("cull")];
+  ASSERT_GT(fix->compute_vector(2), 300);
+  const auto sums = [](const LAMMPS_NS::LAMMPS& lmp) {
+    std::array<double, 3> here{double(lmp.atom->nlocal), 0, 0}, sum{};
+    for (int i = 0; i < lmp.atom->nlocal; ++i) {
+      here[1] += lmp.atom->x[i][2];
+      here[2] += std::abs(lmp.atom->f[i][2]);
+    }
+    MPI_Allreduce(here.data(), sum.data(), 3, MPI_DOUBLE, MPI_SUM, MPI_COMM_WORLD);
+    return sum;
+  };
+  const auto wanted = sums(*stock), found = sums(*asleep);
+  EXPECT_EQ(asleep->atom->natoms, granules);
+  EXPECT_EQ(found[0], granules);
+  EXPECT_NEAR(found[1], wanted[1], 1e-12 * wanted[1]);
+  EXPECT_NEAR(found[2], wanted[2], 1e-12 * contact_force * granules);
+  for (int i = 0; i < asleep->atom->nlocal; ++i)
+    if (asleep->atom->tag[i] == 600) asleep->atom->v[i][2] = 0.2;
+  asleep->input->one("run 20");
+  EXPECT_GT(fix->compute_vector(2), 300) << "what was not changed is culled again";
+  EXPECT_EQ(sums(*asleep)[0], granules);
 }
 
 /// What a program has changed is so, and wakes.
