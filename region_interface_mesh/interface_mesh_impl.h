@@ -54,6 +54,7 @@ struct InterfaceMesh::Impl {
   void hollow_out(const Gather& granules, double largest_radius);
   std::map<openvdb::Coord, std::vector<Sphere>> spheres_by_leaf(const Gather& granules, double largest_radius) const;
   float closed_value(const openvdb::Coord& at) const;
+  double closed_distance(const Vec3& p) const;
   void prune_when_due();
 };
 

@@ -1,4 +1,5 @@
 // Upkeep of an interface mesh: what is made anew where granules of the body come and go, and where others lie in its pores.
+#include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/Morphology.h>
 #include <openvdb/tools/Prune.h>
 
@@ -22,6 +23,9 @@ using Leaf = FloatTree::LeafNodeType;
 constexpr int cell_shift = 2, cell_edge = 1 << cell_shift;  // voxels
 constexpr int cells_of_leaf = 8, all_cells = (1 << cells_of_leaf) - 1;
 static_assert(Leaf::DIM == 2 * cell_edge, "a leaf has eight cells");
+
+/// An exterior granule that reaches so far into the surface is let be: it only touches granules of the body.
+constexpr double hardly = 0.1;  // voxels
 
 /// Exterior granules are told to move when they do so by this, so that what lies still costs nothing.
 constexpr double place_grain = 1.0 / 32;  // voxels
@@ -68,18 +72,30 @@ void put_in_order(std::vector<Sphere>& spheres, double voxel) {
                 spheres.end());
 }
 
-/// A leaf is without these spheres: the CSG difference.
-void take_out_of(Leaf& leaf, const std::vector<Sphere>& spheres, double voxel, float width) {
-  for (const Sphere& s : spheres)
-    for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
-      const Coord at = leaf.offsetToGlobalCoord(n);
-      const Vec3 x = Vec3(at.x(), at.y(), at.z()) * voxel;
-      const auto left = static_cast<float>(s.radius - (x - s.centre).norm());
-      if (left <= leaf.getValue(n)) continue;
-      if (left < width)
-        leaf.setValueOn(n, left);
-      else
-        leaf.setValueOff(n, width);
+/// A leaf is without this sphere: the CSG difference.
+void take_out_of(Leaf& leaf, const Sphere& s, double voxel, float width) {
+  // in voxels, from the leaf's first centre
+  const Coord origin = leaf.origin();
+  const Vec3 c = s.centre / voxel - Vec3(origin.x(), origin.y(), origin.z());
+  const double reach = (s.radius + width) / voxel, reach2 = reach * reach;
+  int lo[3], hi[3];
+  for (int d = 0; d < 3; ++d) {
+    lo[d] = static_cast<int>(std::max(0.0, std::ceil(c[d] - reach)));
+    hi[d] = static_cast<int>(std::min(Leaf::DIM - 1.0, std::floor(c[d] + reach)));
+  }
+  for (int i = lo[0]; i <= hi[0]; ++i)
+    for (int j = lo[1]; j <= hi[1]; ++j) {
+      const double across2 = (i - c[0]) * (i - c[0]) + (j - c[1]) * (j - c[1]);
+      if (across2 >= reach2) continue;
+      for (int k = lo[2]; k <= hi[2]; ++k) {
+        const auto n = static_cast<openvdb::Index>((i * Leaf::DIM + j) * Leaf::DIM + k);
+        const auto left = static_cast<float>(s.radius - voxel * std::sqrt(across2 + (k - c[2]) * (k - c[2])));
+        if (left <= leaf.getValue(n)) continue;
+        if (left < width)
+          leaf.setValueOn(n, left);
+        else
+          leaf.setValueOff(n, width);
+      }
     }
 }
 
@@ -125,6 +141,11 @@ void InterfaceMesh::update(const Gather& granules, double largest_radius) {
 void InterfaceMesh::leave_out(std::vector<Sphere> exterior, const Gather& granules, double largest_radius) {
   for (const Sphere& s : exterior) check(s);
   Impl& m = *impl_;
+  const auto is_far = [&](const Sphere& s) {
+    const double width = level_set::half_band * m.voxel;
+    return s.radius < width && m.closed_value(nearest_voxel(s.centre, m.voxel)) >= static_cast<float>(width);
+  };
+  exterior.erase(std::remove_if(exterior.begin(), exterior.end(), is_far), exterior.end());
   put_in_order(exterior, m.voxel);
   if (m.exterior_is_out && same(exterior, m.exterior)) return;
   m.exterior = std::move(exterior);
@@ -199,9 +220,19 @@ void InterfaceMesh::Impl::make_touched(const Gather& granules, double largest_ra
   }
 }
 
+/// Without what is left out.
 float InterfaceMesh::Impl::closed_value(const Coord& at) const {
   const auto hollow = hollowed.find(at & ~(Leaf::DIM - 1));
   return hollow == hollowed.end() ? grid->constTree().getValue(at) : hollow->second.closed.getValue(at);
+}
+
+double InterfaceMesh::Impl::closed_distance(const Vec3& p) const {
+  struct Closed {  // as OpenVDB's sampler wants a tree
+    using ValueType = float;
+    const Impl& of;
+    float getValue(const Coord& at) const { return of.closed_value(at); }
+  };
+  return openvdb::tools::BoxSampler::sample(Closed{*this}, in_voxels(p));
 }
 
 /// Of the exterior granules those that reach into the closed surface, by the leaves in which they do.
@@ -210,10 +241,8 @@ std::map<Coord, std::vector<Sphere>> InterfaceMesh::Impl::spheres_by_leaf(const 
   std::map<Coord, std::vector<Sphere>> by_leaf;
   for (Sphere s : exterior) {
     s.radius = std::max(s.radius, least);
-    const Coord at = nearest_voxel(s.centre, voxel);
-    const double off = (Vec3(at.x(), at.y(), at.z()) * voxel - s.centre).norm();
-    const double distance = closed_value(at);
-    if (distance < width && distance >= s.radius + off) continue;
+    const double distance = closed_distance(s.centre);
+    if (distance < 0.99 * width && distance >= s.radius - hardly * voxel) continue;
     // granules of the body go first: contacts overlap, and small ones are held larger
     const Vec3 reach = Vec3::Constant(s.radius + std::max(largest_radius, least));
     double radius = s.radius;
@@ -251,7 +280,7 @@ void InterfaceMesh::Impl::hollow_out(const Gather& granules, double largest_radi
   for (auto& [origin, spheres] : due) {
     Leaf& leaf = *tree.touchLeaf(origin);
     const Leaf closed = leaf;
-    take_out_of(leaf, spheres, voxel, width);
+    for (const Sphere& sphere : spheres) take_out_of(leaf, sphere, voxel, width);
     hollowed.emplace(origin, Hollowed{closed, std::move(spheres)});
   }
 }
