@@ -109,10 +109,9 @@ MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, 
   if (is_own_line(command, words, n)) sight = fix ? Sight::all_restored : Sight::nothing;
   const std::string refused = why_no_interface_mesh_for_command(lmp, command, n, words);
   if (!refused.empty()) lmp->error->all(FLERR, refused.c_str());
-  // contacts of another model, or numbers that are read after the fix has gone
-  const bool leaves =
-      fix && !fix->waits_for_run() && n > 0 && (is(command, "pair_style") || (is(command, "unfix") && is(words[0], fix->id)));
-  if (leaves && !fix->in_run()) restore(lmp, *fix, is(command, "unfix") ? nullptr : command);
+  if (is(command, "pair_style") && (!fix || fix->waits_for_run())) sight = Sight::nothing;  // it comes right after read_restart
+  if (fix && !fix->waits_for_run() && !fix->in_run() && is(command, "unfix") && n > 0 && is(words[0], fix->id))
+    restore(lmp, *fix, nullptr);  // numbers may be read after the fix has gone
   remember(lmp, command, line);
   const bool reads = sight == Sight::whole_bed || sight == Sight::all_restored;
   if (reads) refuse_part_of_a_bed(lmp, fix, std::string("before '") + command + "'");

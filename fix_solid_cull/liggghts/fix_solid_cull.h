@@ -83,6 +83,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   /// A program may change them between these two. Local.
   void remember_granules();
   void see_granules_again();
+  void keep_arrays() { memory_.keep_arrays(); }  ///< a program has pointers into them. Local
   void hide_bed();
   /// True if something was culled, which a line then says; nullptr: no line.
   bool restore_all(const char* command);

@@ -59,6 +59,7 @@ void agree(LAMMPS_NS::LAMMPS* lmp, FixSolidCull* fix) {
   MPI_Allreduce(here, anywhere, 3, MPI_INT, MPI_MAX, lmp->world);
   program.keeps_pointers = anywhere[1] != 0;
   program.keeps_forces = anywhere[2] != 0;
+  if (fix && program.keeps_pointers) fix->keep_arrays();
   if (anywhere[0]) show(lmp, *fix, false);
 }
 

@@ -48,13 +48,14 @@ const char* numbers =
 /// A program.
 class Library {
  public:
-  explicit Library(bool culls) {
+  explicit Library(bool culls) : Library(read_bed(bed()) + (culls ? fix_line : "") + numbers + "run 100\nrun 0\n") {}
+  explicit Library(const std::string& deck) {
     std::vector<std::string> words = {"program", "-log", "none", "-screen", "library_tests.screen"};
     std::vector<char*> args;
     for (std::string& w : words) args.push_back(&w[0]);
     lammps_open(static_cast<int>(args.size()), args.data(), MPI_COMM_WORLD, &handle_);
     MPI_Comm_rank(MPI_COMM_WORLD, &me_);
-    command(read_bed(bed()) + (culls ? fix_line : "") + numbers + "run 100\nrun 0\n");
+    command(deck);
   }
   ~Library() { lammps_close(handle_); }
 
@@ -274,6 +275,23 @@ TEST_F(LibraryTest, a_file) {
   MPI_Barrier(MPI_COMM_WORLD);
   for (Library* l : {&stock_, &asleep_}) lammps_file(l->handle(), "library_tests.in");
   EXPECT_NEAR(asleep_.variable("m"), stock_.variable("m"), 1e-12 * stock_.variable("m"));
+}
+
+TEST(LibraryOfALargeBed, leaves_arrays_where_they_are_once_a_program_has_pointers) {
+  Bed lattice;
+  lattice.side = 0.06;
+  Library program(head(lattice) + "region box block 0 0.06 0 0.06 0 0.06 units box\ncreate_box 2 box\nneighbor 0.0003 bin\n" +
+                  body(lattice) +
+                  "unfix grav\nlattice sc 0.002 origin 0.5 0.5 0.5\nregion cube block 0 0.06 0 0.06 0 0.055 units box\n"
+                  "create_atoms 1 region cube\nset group all diameter 0.002 density 2500\nfix move all nve/sphere\nrun 0\n");
+  const int all = lammps_get_natoms(program.handle());
+  ASSERT_GT(all, 20000);
+  double** const x = static_cast<double**>(lammps_extract_atom(program.handle(), "x"));
+  const int* const nlocal = static_cast<int*>(lammps_extract_global(program.handle(), "nlocal"));
+  program.command("fix cull all solid/cull exterior sleep\nrun 2\n");
+  EXPECT_GT(program.culled(), 0.9 * all / 2);
+  EXPECT_EQ(lammps_extract_atom(program.handle(), "x"), x);
+  EXPECT_EQ(Library::sum(*nlocal), all);
 }
 
 TEST(LibraryByClasses, finds_the_whole_bed_after_each_command) {
