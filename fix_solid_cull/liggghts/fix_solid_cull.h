@@ -89,6 +89,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   template <class Work>
   auto hand_on(Work work) -> decltype(work());
   void renew();
+  void reset_rows(int i);
   void refuse(const std::string& why);   // the user's fault; collective
   void broken(const std::string& what);  // ours; local
   void fail(const std::string& why);     // ends the run; local
