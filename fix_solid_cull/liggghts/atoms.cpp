@@ -16,12 +16,6 @@
 
 namespace solidcull {
 
-namespace {
-
-constexpr const char* releases_id = "release_fix_insert_stream";
-
-}  // namespace
-
 EngineAtoms::EngineAtoms(LAMMPS_NS::LAMMPS* lmp, const LAMMPS_NS::Fix* own) : Pointers(lmp), own_(own), records_(lmp, own) {}
 
 void EngineAtoms::renew() {

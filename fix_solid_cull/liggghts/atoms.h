@@ -12,6 +12,9 @@
 
 namespace solidcull {
 
+/// The ID of the fix that keeps when granules of fix insert/stream are released.
+constexpr const char* releases_id = "release_fix_insert_stream";
+
 class EngineAtoms : public Atoms, protected LAMMPS_NS::Pointers {
  public:
   /// own: the culling's fix, whose group and per-atom arrays are its own matter.
