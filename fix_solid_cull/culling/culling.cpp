@@ -335,14 +335,18 @@ void Culling::open_for_insertion(std::int64_t step) {
     p_.ports.run.ask_for_reneighbouring(step);
 }
 
-/// What was made at a place that is taken by a stored granule cannot stay: stored ones are brought back for each fix that
-/// inserts, so nothing that LIGGGHTS does is known to come here. Before anything comes out of the store.
-void Culling::check_new_granules() {
-  const bool in_a_run = phase_ == Phase::stepping;  // between runs decks may make granules anywhere: the bed is shown
-  if (const std::int64_t tag = in_a_run && p_.census.something_stored() ? p_.closure.new_granule_in_stored() : 0)
-    throw InputError("granule " + std::to_string(tag) +
-                     " was inserted into the place of a culled one: give the insertion a region above the bed, or unfix " +
-                     p_.ports.run.name + " first");
+/// What was made inside a stored granule cannot stay. Stored ones come back for each fix that inserts, so nothing that LIGGGHTS
+/// does is known to come here; but between runs a deck may make granules anywhere, and fixes need not look for overlap. What was
+/// culled there wakes before the first force: a blow is shared by two. Before anything comes out of the store.
+void Culling::meet_new_granules() {
+  if (p_.census.something_locked()) {
+    const ShellClosure::Overlapped found = p_.closure.by_new_granules();
+    if (found.in_stored && phase_ == Phase::stepping)
+      throw InputError("granule " + std::to_string(found.in_stored) +
+                       " was inserted into the place of a culled one: give the insertion a region above the bed, or unfix " +
+                       p_.ports.run.name + " first");
+    for (const Vec3& place : found.places) p_.wake.ask(place, p_.scales.wake_up().largest_radius());
+  }
   p_.closure.forget_new();
 }
 

@@ -100,7 +100,7 @@ class Culling {
   void judge(bool may_cull, const Proposal& proposal);
   void ask_for_build(std::int64_t step);
   void open_for_insertion(std::int64_t step);
-  void check_new_granules();
+  void meet_new_granules();
   void close_shell(bool changes, bool& shell_changed);
   void refill(bool& shell_changed);
   void store_and_fetch(const MembershipChange& c, bool changes, bool& shell_changed);

@@ -28,7 +28,7 @@ void Culling::change() {
   check_numbers(p_.ports.atoms);  // before they are sorted into cells, here and by the engine
   if (!p_.solid.has_store()) return;
   const auto timed = p_.report.time(Part::membership);
-  check_new_granules();
+  meet_new_granules();
   follow_box();
   // another fix may have deleted granules in this hook
   if (phase_ == Phase::stepping && p_.census.something_locked() && p_.lost.forget_lost()) settle_bodies();

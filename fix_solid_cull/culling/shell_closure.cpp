@@ -62,21 +62,33 @@ void ShellClosure::share() {
   for (const Row& r : ports_.ranks.exchange(rows, reach)) foreign_.push_back({{vec(r.at), r.radius}, r.body, r.stands});
 }
 
-std::int64_t ShellClosure::new_granule_in_stored() const {
-  if (!ports_.ranks.any(some_made_)) return 0;
+ShellClosure::Overlapped ShellClosure::by_new_granules() const {
+  Overlapped found;
+  if (!ports_.ranks.any(some_made_)) return found;
   struct Row {
     Triple at;
     double radius;
     std::int64_t tag;
   };
+  const Atoms& atoms = ports_.atoms;
   std::vector<Row> rows;
-  for (int i = 0; some_made_ && i < ports_.atoms.owned; ++i)
-    if (rows_[i].made) rows.push_back({triple(ports_.atoms.place(i)), ports_.atoms.radius[i], ports_.atoms.tag[i]});
+  for (int i = 0; some_made_ && i < atoms.owned; ++i)
+    if (rows_[i].made) rows.push_back({triple(atoms.place(i)), atoms.radius[i], atoms.tag[i]});
   const std::vector<Row> others = ports_.ranks.exchange(rows, contact_reach(ports_, solid_) + stored_.slack());
   rows.insert(rows.end(), others.begin(), others.end());
-  std::int64_t found = 0;
-  for (const Row& r : rows) stored_.for_each_near({vec(r.at), r.radius}, 0, [&](const Resident&) { found = r.tag; });
-  ports_.ranks.largest(&found, 1);
+  std::vector<Sphere> made;
+  for (const Row& r : rows) {
+    made.push_back({vec(r.at), r.radius});
+    stored_.for_each_near(made.back(), 0, [&](const Resident& g) {
+      found.in_stored = r.tag;
+      found.places.push_back(solid_.in_world(g));
+    });
+  }
+  SphereCells cells;
+  cells.build(std::move(made), 2 * scales_.diameter());
+  for (int i = 0; i < atoms.owned; ++i)
+    if (shell_.locked(i) && cells.any_near(atoms.sphere(i), 0)) found.places.push_back(atoms.place(i));
+  ports_.ranks.largest(&found.in_stored, 1);
   return found;
 }
 

@@ -51,8 +51,12 @@ class ShellClosure : public BodyFollower {
 
   // --- granules that were made since the last membership change
   void was_made(int i) { rows_[i].made = some_made_ = true; }  ///< local
-  /// The tag of one that overlaps a stored granule; 0: none does. Collective.
-  std::int64_t new_granule_in_stored() const;
+  struct Overlapped {
+    std::int64_t in_stored = 0;  ///< tag of a new granule that overlaps a stored one; 0: none does. On all ranks
+    std::vector<Vec3> places;    ///< of the culled granules of this rank that new ones overlap
+  };
+  /// Collective.
+  Overlapped by_new_granules() const;
   void forget_new();  ///< local
 
   /// A run begins: walls may be others, and stored granules at them are atoms until they are seen to rest.

@@ -317,21 +317,26 @@ TEST(ShellClosure, an_insertion_of_large_granules_opens_the_bed_as_far_as_they_r
   }
 }
 
-TEST(ShellClosure, a_granule_that_was_made_in_a_stored_one_is_found) {
+TEST(ShellClosure, what_a_new_granule_overlaps_is_found_before_anything_comes_out_of_the_store) {
   struct Case {
     double gap;  // of the surfaces, in radii
-    bool made;
-    std::int64_t found;
+    bool made, stored;
   };
-  for (const Case& c : {Case{-0.01, true, 99}, Case{0.01, true, 0}, Case{-0.01, false, 0}}) {
+  for (const Case& c : {Case{-0.01, true, true}, Case{-0.01, true, false}, Case{0.01, true, true}, Case{-0.01, false, true}}) {
     Row row;
-    row.parts.put_away(row.tags);
+    if (c.stored) row.parts.put_away(row.tags);
     const int i = row.world.add(99, Row::x(5) + Vec3(0, (2 + c.gap) * r, 0), r);
     if (c.made) row.parts.closure.was_made(i);
-    EXPECT_EQ(row.parts.closure.new_granule_in_stored(), c.found) << c.gap;
-    EXPECT_EQ(row.stored(), all_but(10, {})) << "before anything comes out of the store";
+    const bool overlaps = c.made && c.gap < 0;
+    const ShellClosure::Overlapped found = row.parts.closure.by_new_granules();
+    EXPECT_EQ(found.in_stored, overlaps && c.stored ? 99 : 0) << c.gap;
+    ASSERT_EQ(found.places.size(), overlaps ? 1u : 0u) << c.gap;
+    if (overlaps) {
+      EXPECT_NEAR((found.places[0] - Row::x(5)).norm(), 0, 1e-12);
+    }
+    EXPECT_EQ(row.stored(), c.stored ? all_but(10, {}) : Tags());
     row.parts.closure.forget_new();
-    EXPECT_EQ(row.parts.closure.new_granule_in_stored(), 0);
+    EXPECT_TRUE(row.parts.closure.by_new_granules().places.empty());
   }
 }
 
