@@ -1,5 +1,8 @@
 /* For programs that embed LIGGGHTS: libsolidcull.so is linked before libliggghts.so, or preloaded. Loaded later (dlopen) it
-   misses LIGGGHTS's calls, and the fix says so and stops. */
+   misses LIGGGHTS's calls, and the fix says so and stops.
+
+   Whenever the program has control it finds the whole bed, through every function of LIGGGHTS's library.h and through LIGGGHTS's
+   classes: see "Programs" in fix_solid_cull.md. */
 #ifndef SOLIDCULL_H
 #define SOLIDCULL_H
 

@@ -355,8 +355,8 @@ class Spoiled(Scripts):
                       self.spoiled(r"""deck = re.sub("(?m)^(fix cull .*)$", r"\1 every 1000000", deck)"""))
 
     def test_a_deck_that_ends_early(self):
-        self.assertIn("motion: drop-flat, few steps: culled-1 made 400 steps after the fix line, not 800",
-                      self.spoiled(r"""deck = re.sub(r"(?m)^run \$\{steps\}$", "run 0", deck)"""))
+        self.assertIn("motion: drop-flat, few steps: culled-1 made 0 steps after the fix line, not 800",
+                      self.spoiled(r"""deck = re.sub(r"(?m)^run \$\{twin_end\} upto$", "run 0", deck)"""))
 
     def test_a_granule_that_is_lost(self):
         self.assertIn("motion: drop-flat, few steps: culled-1 ended with 255 granules of 255 ids, not 256", self.spoiled(lose=True))
@@ -366,7 +366,7 @@ class Spoiled(Scripts):
 
     def test_stress_tells_a_deck_that_ends_early(self):
         self.assertIn("stress: sway, few steps: live made 0 steps after the fix line, not 500",
-                      self.spoiled(r"""deck = re.sub(r"(?m)^run \$\{steps\}$", "run 0", deck)""", suite="stress", scene="sway"))
+                      self.spoiled(r"""deck = re.sub(r"(?m)^run \$\{twin_end\} upto$", "run 0", deck)""", suite="stress", scene="sway"))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """Twenty random decks with solid/cull against stock LIGGGHTS; and that the fuzzer sees what it is for."""
 import copy
-import os
 import sys
 import tempfile
 import unittest
@@ -8,14 +7,48 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "fuzz"))
+import driver  # noqa: E402
 import fuzz  # noqa: E402
 import grammar  # noqa: E402
 import judge  # noqa: E402
+import more  # noqa: E402
 from decks import CullLine, Deck, Part  # noqa: E402
 from shrink import shrink  # noqa: E402
 
 SEEDS = (6, 10, 11, 12, 16, 21, 23, 25, 28, 29, 31, 32, 34, 37, 42, 43, 44, 46, 47, 49)  # of 50, those that cull
 RANKS = (1, 1, 1, 1, 2)
+MORE_SEEDS = (2000,)
+LIBRARY_SEEDS = (2000,)
+HEAD = """\
+atom_style granular
+atom_modify map array
+boundary f f f
+newton off
+communicate single vel yes
+units si
+processors 2 1 1
+region box block 0 0.012 0 0.012 -0.0001 0.06 units box
+create_box 2 box
+neighbor 0.0004 bin
+neigh_modify delay 0
+fix m1 all property/global youngsModulus peratomtype 5e6 5e6
+fix m2 all property/global poissonsRatio peratomtype 0.3 0.3
+fix m3 all property/global coefficientRestitution peratomtypepair 2 .3 .3 .3 .3
+fix m4 all property/global coefficientFriction peratomtypepair 2 .5 .5 .5 .5
+pair_style gran model hertz tangential history
+pair_coeff * *
+timestep 2e-5
+fix grav all gravity 9.81 vector 0 0 -1
+fix floor all mesh/surface/stress file floor.stl type 1
+fix meshes all wall/gran model hertz tangential history mesh n_meshes 1 meshes floor
+lattice sc 0.003 origin 0.5 0.5 0.5
+region fill block 0 0.012 0 0.012 0 0.006 units box
+create_atoms 1 region fill
+set group all diameter 0.003 density 2500
+fix integrate all nve/sphere
+compute ke all ke
+compute lib_mass all property/atom mass
+run 100""".splitlines()
 WENT_WRONG = (5009, 5060, 40007, 70066, 80191)  # once, on one to four ranks
 
 
@@ -26,19 +59,30 @@ class RandomDecks(unittest.TestCase):
         with tempfile.TemporaryDirectory(prefix="solidcull-fuzz-") as folder:
             for seed in SEEDS:
                 with self.subTest(seed=seed):
-                    verdict = fuzz.verdict_of(grammar.make(seed, ranks=RANKS), Path(folder) / str(seed))
+                    verdict = fuzz.verdict_of(grammar.make(seed, ranks=RANKS, more=False), Path(folder) / str(seed))
                     culled += verdict.culled > 0
                     self.assertFalse(verdict.fails(), f"{verdict.kind}: {verdict.text}\n"
-                                     f"tests/fuzz/fuzz.py --seed {seed} --count 1 --ranks {','.join(map(str, RANKS))} --shrink")
+                                     f"tests/fuzz/fuzz.py --plain --seed {seed} --count 1 --ranks {','.join(map(str, RANKS))} --shrink")
         self.assertGreaterEqual(culled, 15, "most decks cull nothing: they test nothing")
-
 
     def test_decks_that_went_wrong(self):
         with tempfile.TemporaryDirectory(prefix="solidcull-fuzz-") as folder:
             for seed in WENT_WRONG:
                 with self.subTest(seed=seed):
-                    verdict = fuzz.verdict_of(grammar.make(seed), Path(folder) / str(seed))
-                    self.assertFalse(verdict.fails(), f"{verdict.kind}: {verdict.text}\ntests/fuzz/fuzz.py --seed {seed} --count 1")
+                    verdict = fuzz.verdict_of(grammar.make(seed, more=False), Path(folder) / str(seed))
+                    self.assertFalse(verdict.fails(), f"{verdict.kind}: {verdict.text}\ntests/fuzz/fuzz.py --plain --seed {seed} --count 1")
+
+
+    def test_decks_with_more_and_by_way_of_the_library(self):
+        """And that stock is right about itself: what the judge would hold against the fix is then no fault of the fuzzer."""
+        with tempfile.TemporaryDirectory(prefix="solidcull-fuzz-") as folder:
+            for library, seeds in ((False, MORE_SEEDS), (True, LIBRARY_SEEDS)):
+                for seed in seeds:
+                    deck = grammar.make(seed, ranks=RANKS, library=library)
+                    for what, verdict in (("stock", fuzz.stock_again(deck, Path(folder))), ("culled", fuzz.verdict_of(deck, Path(folder)))):
+                        with self.subTest(seed=seed, run=what, library=library):
+                            self.assertEqual(verdict.kind, "good", f"{verdict.text}\ntests/fuzz/fuzz.py --seed {seed} --count 1 --ranks "
+                                             f"{','.join(map(str, RANKS))} --library {'all' if library else 'none'} --shrink")
 
 
 class Grammar(unittest.TestCase):
@@ -46,6 +90,14 @@ class Grammar(unittest.TestCase):
         for culled in (False, True):
             self.assertEqual(grammar.make(7).text(0, culled), grammar.make(7).text(0, culled))
         self.assertNotEqual(grammar.make(7).text(0, True), grammar.make(8).text(0, True))
+
+    def test_decks_have_all_that_more_has(self):
+        text = "".join(grammar.make(seed, library=seed % 2 == 0).text(0, True) for seed in range(200))
+        for words in ("insert/stream", "contact/atom", "stress/atom virial", "pair/gran/local", "wall/gran/local", " post no", " pre no post no", "pair_style gran model hooke", "file high.stl", "file low.stl",
+                      *(f"#library {what} " for what in (*more.ASKS, "fix")), "#library by file", "#library by commands"):
+            self.assertIn(words, text)
+        plain = "".join(grammar.make(seed, more=False).text(0, True) for seed in range(200))
+        self.assertFalse([word for word in ("#library", "insert/stream", "contact/atom") if word in plain])
 
     def test_stock_sees_nothing_of_the_fix(self):
         for seed in range(100):
@@ -101,6 +153,12 @@ class Judge(unittest.TestCase):
         self.stock.checks, self.mine.checks = {"c1": ("exact", 4.0)}, {"c1": ("exact", 3.0)}
         self.assertEqual(self.kind(), "check")
 
+    def test_sums_over_contacts_may_differ_a_little(self):
+        for kind, value, good, bad in (("contacts", 1000, 800, 700), ("load", -0.5, -0.2, -0.1), ("load", 2.0, 1.5, 0.0)):
+            for got, expected in ((good, "good"), (bad, "check")):
+                self.stock.checks, self.mine.checks = {"c1": (kind, value)}, {"c1": (kind, got)}
+                self.assertEqual(self.kind(), expected, (kind, value, got))
+
     def test_stops(self):
         for text, errors, status, kind in (("Segmentation fault", [], 139, "crash"), ("terminate called after", [], 134, "crash"), ("", [], -11, "crash"),
                                            ("", ["ERROR: fix cull solid/cull: no such thing"], 1, "refusal"),
@@ -116,6 +174,39 @@ class Judge(unittest.TestCase):
         self.assertEqual(self.kind(), "unjudged")
         self.mine = judge.End(status=139)
         self.assertEqual(self.kind(), "crash")
+
+
+class Driver(unittest.TestCase):
+    def test_a_deck_goes_by_turns_and_a_loop_in_one_piece(self):
+        lines = ["a", "b", "#library by commands", "c", "label here", "run 1", "next n", "jump SELF here", "d", "#library natoms l1 exact", "", "#library by file", "e"]
+        self.assertEqual(list(driver.pieces(lines)), [("file", ["a", "b"]), ("command", ["c"]), ("file", lines[4:8]), ("command", ["d"]),
+                                                      ("ask", ["natoms l1 exact"]), ("file", ["e"])])
+
+    def test_what_ranks_got_is_summed_where_it_is_to_be(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for rank in (0, 1):
+                (Path(folder) / f"library.{rank}").write_text(f"l1 exact 7 once\nl2 loose {rank + 2}.5 sum\n")
+            end = judge.End()
+            judge.read_library(end, Path(folder))
+            self.assertEqual(end.checks, {"l1": ("exact", 7.0), "l2": ("loose", 6.0)})
+
+    @unittest.skipUnless(fuzz.STOCK, "no stock liggghts")
+    def test_stock_answers_each_question_as_a_dump_does(self):
+        asks = ["natoms n exact", "world w exact", "masses m exact", "compute c exact", "each e exact", "formula f exact count(all)", "fix t exact floor 3",
+                *(f"gathered g{what} exact {what}" for what in driver.DUMPED), "scattered s exact x 2 3 9 0.001", "scattered k exact v 0 1 99 0.5"]
+        deck = grammar.Grammar(1, ranks=[2], library=True)
+        deck.say(*HEAD, *(f"#library {ask}" for ask in asks), "run 5", "#library natoms last exact", needed=True)
+        made = Deck(1, [2], [deck.parts], {"library"}, grammar.meshes(0.012, 0.012, 0.03, 5))
+        with tempfile.TemporaryDirectory(prefix="solidcull-fuzz-") as folder:
+            end = judge.run(made, False, fuzz.STOCK, folder)
+        self.assertEqual((end.status, end.errors), (0, []), end.text[-2000:])
+        checks = {name: value for name, (_, value) in end.checks.items()}
+        for name in ("n", "where", "mtags", "f", "last", "gxn"):
+            self.assertEqual(checks[name], 32, name)
+        for name in ("cke", "t", "gx", "gv", "gradius", "gtype", "s", "sdump", "k", "kdump"):
+            self.assertEqual(checks[name], 0, name)
+        for name in ("m", "c", "e"):
+            self.assertAlmostEqual(checks[name] / (32 * 2500 * 3.141592653589793 / 6 * 0.003**3), 1, msg=name)
 
 
 class Shrink(unittest.TestCase):

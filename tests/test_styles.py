@@ -50,7 +50,7 @@ def section(heading):
 def in_page(heading, rows):
     treatments = {}
     first = section(heading).split("| beside")[1].split("\n\n")[0]
-    for row in re.findall(r"^\| (?!---)([^|]+) \| ([^|]+) \|$", first.split("\n", 1)[1], re.M):
+    for row in re.findall(r"^\| (?!---)([^|]+) \| ([^|]+) \|(?: [^|]*\|)?$", first.split("\n", 1)[1], re.M):
         (treatment,) = [t for begin, t in rows.items() if row[0].startswith(begin)]
         treatments.update({name: treatment for name in re.findall(r"`([^`]+)`", row[1])})
     return treatments
@@ -70,6 +70,12 @@ def named(name, style):
 
 
 class Styles(unittest.TestCase):
+    def test_the_page_says_of_each_style_what_a_formula_between_runs_has(self):
+        for heading in ("Fix styles", "Compute styles"):
+            table = section(heading).split("| beside")[1].split("\n\n")[0].splitlines()[2:]
+            said = {row.split("|")[1].split()[0].rstrip(":;,"): row.split("|")[3].strip() for row in table}
+            self.assertEqual([begin for begin, value in said.items() if not value], ["refused"], heading)
+
     def test_the_page_says_what_the_code_does(self):
         self.assertEqual(in_page("Fix styles", FIX_ROWS), {n: t for n, t in fixes_in_code().items() if n not in HELPERS})
         self.assertEqual(in_page("Compute styles", COMPUTE_ROWS), computes_in_code())

@@ -8,6 +8,8 @@ may be is culled, so that at step 100 the ball is LIGGGHTS's only atom. What a r
   contacts             the same values for exterior granules; the line says what is missing
   holds, drives, whole no granule of the group is culled at any step, the others are; value and places are stock's
 
+Between two runs a formula has stock's value, whatever the treatment, or is refused where a fix has measured atoms only.
+
 A style is one line of FIXES or COMPUTES: the lines of the deck that use it, a value, and what the row needs besides.
 """
 import math
@@ -255,6 +257,14 @@ WHOLE_BED = {
     "xcm(all,z)": "f_cull[26]",
     "vcm(all,z)*mass(all)": "vcm(all,z)*mass(all)+f_cull[15]",
 }
+# functions of variables and of thermo, evaluated between runs
+FUNCTIONS = ["count(all)", "mass(all)", "xcm(all,z)", "vcm(all,z)", "fcm(all,z)", "bound(all,zmax)", "gyration(all)", "ke(all)", "angmom(all,x)",
+             "torque(all,x)", "inertia(all,zz)", "omega(all,z)", "count(all,left)", "mass(left,right)", "z[100]", "vz[344]", "r[20]",
+             "atoms", "fz[20]", "tqx[20]"]
+NOT_IN_FORMULAS = ["gyration/molecule"]  # LIGGGHTS says that it is not current, however it was used
+EQUAL = 1e-3  # of the largest value of the run, or of what is small beside the bed's weight and the ball's motion
+SMALL = {"angmom(all,x)": 1e-9, "torque(all,x)": 1e-6, "omega(all,z)": 1e-3, "fz[20]": 3e-4, "tqx[20]": 5e-7,
+         **{f"erotate{s}": 1e-12 for s in ("", "/sphere", "/sphere/atom")}}
 LATER = ["fix x left addforce 5e-4 0 0", "fix x left setforce 0 0 NULL", "compute x left com",
          "unfix grav\nfix grav right gravity 9.81 vector 0 0 -1",
          "unfix integrate\nfix integrate right nve/sphere\nfix x left nve/noforce"]
@@ -386,6 +396,41 @@ class Decks(Case):
                 self.assertEqual({t.body for t in culled}, {0}, "a granule of the group was culled")
                 if style not in fixes_in_code() or treatment(fixes_in_code(), style) == "drives":
                     self.assertRegex(log, f"(?m)^fix cull solid/cull: .*\\({re.escape(style)}\\) .*: granules of its group are not culled")
+
+    def between_runs(self, row, culled):
+        """The value in a formula after a run in which the bed went to sleep; what LIGGGHTS said."""
+        run = Run("\n".join([
+            self.bed(row) + row.lines.replace("{place}", str(self.place)), "variable value equal " + row.value, *([CULL] if culled else []),
+            "thermo 50", "thermo_style custom step v_value " + ("f_cull[3]" if culled else "atoms"),
+            f"thermo_modify format float %.12g lost {row.lost} norm no", "run 150", "print 'BETWEEN ${value}'\n"]), ranks=row.ranks)
+        found = re.findall(r"(?m)^BETWEEN (\S+)$", run.screen + run.log)
+        told = [line.split() for line in run.thermo()]
+        return float(found[0]) if found else None, told, run.screen + run.log
+
+    def test_in_a_formula_between_runs(self):
+        functions = [(f, Row("", f)) for f in FUNCTIONS]
+        refused = 0
+        for style, row in [*FIXES.items(), *COMPUTES.items(), *functions]:
+            if not row.value:
+                continue
+            with self.subTest(style):
+                wanted, stock, _ = self.between_runs(row, False)
+                value, told, said = self.between_runs(row, True)
+                self.assertGreater(max(float(t[2]) for t in told), row.stored, "too little was stored: the row shows nothing")
+                of_atoms = style in FIXES and treatment(fixes_in_code(), style) == "atoms_only"
+                if of_atoms and re.search(r"\bf_x\b", row.value):
+                    self.assertIsNone(value)
+                    self.assertRegex(said, rf"reads fix x \({style}\), which has measured atoms only, without the granules")
+                    refused += 1
+                    continue
+                if style in NOT_IN_FORMULAS:
+                    self.assertEqual((wanted, value), (None, None))
+                    continue
+                self.assertIsNotNone(wanted, "stock does not take the formula")
+                self.assertIsNotNone(value, said[-2000:])
+                scale = max([abs(float(t[1])) for t in stock] + [abs(wanted), SMALL.get(style, 0)])
+                self.assertLessEqual(abs(value - wanted), EQUAL * scale)
+        self.assertEqual(refused, 3, "ave/histo, ave/spatial, check/timestep/gran")
 
     def test_values_for_the_whole_bed(self):
         for value, whole in WHOLE_BED.items():

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT / "validation"))
 import twin  # noqa: E402
-from solidcull_runs import beds, decks, dumps, engine, errors, few_steps, logs, meshes, metrics, pictures, surfaces, tables, twins  # noqa: E402
+from solidcull_runs import beds, decks, dumps, engine, errors, few_steps, logs, meshes, metrics, pictures, restarts, shifts, surfaces, tables, twins  # noqa: E402
 
 DECK = """\
 variable dx index 0
@@ -108,7 +108,10 @@ class Folder(unittest.TestCase):
         self.folder = Path(folder.name)
 
     def write(self, name, text):
-        (self.folder / name).write_text(text)
+        return self.write_bytes(name, text.encode())
+
+    def write_bytes(self, name, content):
+        (self.folder / name).write_bytes(content)
         return self.folder / name
 
     def refused(self, text, call, *args, **keywords):
@@ -124,7 +127,8 @@ class Decks(Folder):
         self.lines = decks.read_deck(self.write("in.deck", DECK))
 
     def made(self, culled, seed=None, lines=None):
-        return decks.make_deck(lines or self.lines, "cull", culled, seed, "out/run-1")
+        lines = lines or self.lines
+        return decks.make_deck(lines, "cull", culled, shifts.Shift(seed, lines) if seed else None, "out/run-1")
 
     def test_the_fix_is_found_over_continued_lines(self):
         self.assertEqual(decks.cull_fix(self.lines), "cull")
@@ -156,12 +160,64 @@ class Decks(Folder):
 
     def test_the_shift_stands_before_the_first_run_behind_the_fix(self):
         made = self.made(False, seed=decks.SEEDS[0])
-        self.assertTrue(made[made.index("run 1000") - 1].startswith("set group all z"))
-        self.assertEqual(sum("set group" in line for line in made), 3)
+        run = made.index("run ${twin_end} upto")
+        self.assertIn("variable twin_steps string 1000", made[:run])
+        self.assertEqual(made[run - 2].count("set group all"), 3)
+        self.assertTrue(made[run - 2].endswith('"variable twin_there equal 0" "variable twin_waits equal 0"'))
+        self.assertGreater(made.index("variable twin_there equal count(all)>0"), made.index(f'print "{logs.FROM_HERE}"'))
+
+    def test_the_run_that_nothing_is_moved_in_goes_in_the_same_parts(self):
+        lines = self.lines[:-3]
+        moved, still = (decks.make_deck(lines, "cull", False, shifts.Shift(seed, lines), "out/run-1") for seed in (decks.SEEDS[0], None))
+        self.assertFalse([line for line in still if "set group" in line or "random" in line])
+        self.assertEqual([line for line in moved if line.startswith(("run", 'if "${twin_on}"'))], [line for line in still if line.startswith(("run", 'if "${twin_on}"'))])
+
+    def test_runs_that_cannot_go_in_parts(self):
+        for line, text in (('run 100 every 10 "print a" # all', 'run 100 every 10 "print a" "if \'${twin_there}\' then \'variable'), ("run 100 every 10 NULL", 'run 100 every 10 "if'),
+                           ("run 100 pre no", "run 100 pre no")):
+            made = shifts.Shift(None, []).before(decks.words_of(line), line)
+            self.assertTrue(made[-1].startswith(text), made)
+
+    def test_what_a_stream_holds_is_moved_again(self):
+        stream = ["fix ins all insert/stream seed 32452843"]
+        for lines, times in ((stream, 0), ([], 1)):
+            self.assertEqual(shifts.Shift(decks.SEEDS[0], lines).move().count("twin_there equal 0"), times)
 
     def test_what_cannot_be_left_out_is_refused(self):
         lines = self.lines[:6] + ['if "${share} > 3" then "run 10"']
         self.refused("hangs on the solid/cull fix and cannot be left out: if", self.made, False, lines=lines)
+
+    def test_what_has_no_meaning_without_the_fix_ends_the_comparison_behind_a_run(self):
+        lines = self.lines[:-3] + ["variable inside equal count(inner)", 'print "${inside}"', "delete_atoms region solid", "run 77"]
+        number = lines.index("delete_atoms region solid") + 1
+        for culled in (False, True):
+            made = self.made(culled, lines=lines)
+            self.assertEqual(decks.ends_before(made), number)
+            self.assertFalse([line for line in made if line.startswith(("delete_atoms", "run 77"))])
+            self.assertEqual("variable inside equal count(inner)" in made, culled)
+        self.assertIsNone(decks.ends_before(self.made(False)))
+
+    def test_culled_granules_of_a_restart_file_are_taken_up_before_anything_asks_for_them(self):
+        lines = ["variable f index a.restart", "read_restart ${f}", "fix cull all solid/cull", "compute top all reduce max z", "label go", "run 10", "jump SELF go"]
+        self.assertEqual(decks.restart_of(lines, "cull", {}), "a.restart")
+        self.assertEqual(decks.restart_of(lines, "cull", {"f": "b.restart"}), "b.restart")
+        self.assertIsNone(decks.restart_of(["fix cull all solid/cull", "read_restart late"], "cull", {}))
+        for culled, taken_up in ((False, ["run 0", "unfix cull"]), (True, ["run 0"])):
+            made = decks.make_deck(lines, "cull", culled, None, "out/run-1", restored=True)
+            at = made.index("label go")
+            self.assertEqual(made[at - len(taken_up):at], taken_up)
+            self.assertIn("fix cull all solid/cull", made)
+        self.assertTrue(restarts.holds_culled(self.write_bytes("a.restart", b"engine" + b"SDCULLE1" + bytes(56))))
+        self.assertFalse(restarts.holds_culled(self.write_bytes("b.restart", b"engine" * 20)))
+        self.assertFalse(restarts.holds_culled(self.folder / "none.restart"))
+
+    def test_a_variable_that_takes_no_value_from_outside_is_refused(self):
+        decks.check_vary("s", ["1", "2"], 2, ["variable s index 5", "fix ins all insert/pack seed ${s}"])
+        decks.check_vary("s", ["1", "2"], 2, ["fix ins all insert/pack seed $s"])
+        self.refused("--vary s has 1 values for 2 runs", decks.check_vary, "s", ["1"], 2, ["print $s"])
+        self.refused("only a variable of style index takes a value from outside; write `variable s index ...` in place of `variable s equal 5`",
+                     decks.check_vary, "s", ["1", "2"], 2, ["variable s equal 5", "print $s"])
+        self.refused("--vary seed: the deck does not use it; write ${seed}", decks.check_vary, "seed", ["1", "2"], 2, ["variable s index 5", "print $s"])
 
     def test_refusals(self):
         self.refused("has no `fix ID group solid/cull` line", decks.cull_fix, ["run 10"], "in.deck")
@@ -287,7 +343,8 @@ class Command(Folder):
                 (self.DECK, ("--metrics", "c_nope"), "c_nope is not among the thermo columns"),
                 (self.DECK, ("--metrics", "v_depth:median"), "`median` is not one of end, max, min, mean"),
                 (self.DECK, ("--launcher", "/nowhere/liggghts-solidcull"), "no launcher at /nowhere/liggghts-solidcull"),
-                (self.DECK, ("--vary", "dx=0,1"), "--vary dx has 2 values for 3 runs")):
+                (self.DECK, ("--vary", "dx=0,1"), "--vary dx has 2 values for 3 runs"),
+                (self.DECK, ("--vary", "dx=0,1,2"), "--vary dx: the deck does not use it")):
             status, out, err = self.run_twin(deck, *options)
             self.assertEqual((status, out), (2, ""), text)
             self.assertIn(text, err)
@@ -308,8 +365,76 @@ class Command(Folder):
         self.assertFalse(pid.exists() and Path(f"/proc/{pid.read_text()}").exists(), "the other run goes on")
 
     def test_runs_that_are_all_alike_are_named(self):
-        _, out, _ = self.run_twin(self.DECK, "--metrics", "v_depth", "--vary", "dx=0,1,2")
+        _, out, _ = self.run_twin('print "${dx}"\n' + self.DECK, "--metrics", "v_depth", "--vary", "dx=0,1,2")
         self.assertIn("the unculled runs are all alike", out)
+
+
+HEAD = """\
+atom_style granular
+atom_modify map array
+boundary f f f
+newton off
+communicate single vel yes
+units si
+region reg block -.02 .02 -.02 .02 0 .08 units box
+create_box 1 reg
+neighbor 0.002 bin
+neigh_modify delay 0
+fix m1 all property/global youngsModulus peratomtype 5e6
+fix m2 all property/global poissonsRatio peratomtype 0.3
+fix m3 all property/global coefficientRestitution peratomtypepair 1 0.3
+fix m4 all property/global coefficientFriction peratomtypepair 1 .5
+pair_style gran model hertz tangential history
+pair_coeff * *
+timestep 4e-5
+fix grav all gravity 9.81 vector 0 0 -1
+fix w4 all wall/gran model hertz tangential history primitive type 1 zplane 0
+fix sides all wall/gran model hertz tangential history primitive type 1 zcylinder 0.018 0 0
+fix pts all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.003
+fix pdd all particledistribution/discrete 49979687 1 pts 1
+region fill cylinder z 0 0 0.014 0.01 0.07 units box
+fix integr all nve/sphere
+compute spin all erotate/sphere
+thermo 100
+thermo_style custom step atoms ke c_spin
+"""
+PLACE = "overlapcheck yes all_in yes vel constant 0 0 -0.5 region fill"
+LINE = "fix cull all solid/cull every 10 calm 1 speed 0.5 tolerance 30 0\n"
+
+
+@unittest.skipUnless(os.access(ROOT / "build/liggghts-solidcull", os.X_OK), "no build/liggghts-solidcull")
+class RealDecks(Folder):
+    """Decks whose granules come in one way or another: each unculled run goes its own way, and nothing is lost."""
+
+    def compared(self, deck, vary=None):
+        result, _ = twins.compare(self.write("in.deck", HEAD + deck), ["ke", "c_spin"], out=self.folder / "out", vary=vary)
+        self.assertEqual((result["ledger"]["lost"], result["ledger"]["ids_missing"]), (0, 0))
+        return result
+
+    def test_granules_that_come_with_a_run(self):
+        pack = f"fix ins all insert/pack seed 86028157 distributiontemplate pdd insert_every once {PLACE} particles_in_region 60"
+        for name, deck in (("with the first", f"{pack}\n{LINE}run 2000\n"),
+                           ("with a later one", f"{LINE}run 200\n{pack}\nrun 2000 upto\n"),
+                           ("on the way, in every run", f"fix ins all insert/rate/region seed 86028157 distributiontemplate pdd nparticles 90 particlerate 2000 start 300 insert_every 200 {PLACE}\n"
+                                                        f"{LINE}variable n index 900\nrun ${{n}}\nrun 1500 upto post no\n"),
+                           ("interrupted", f"{pack}\n{LINE}run 2000 every 500 \"print 'on the way'\"\n"),
+                           ("in a loop", f"{pack}\n{LINE}variable i loop 40\nlabel here\nrun 50\nnext i\njump SELF here\n")):
+            with self.subTest(granules=name):
+                self.assertFalse(self.compared(deck)["no_scatter"])
+
+    def test_a_seed_of_the_deck(self):
+        result = self.compared(f"variable s index 86028157\nfix ins all insert/pack seed ${{s}} distributiontemplate pdd insert_every once {PLACE} particles_in_region 60\n{LINE}run 2000\n",
+                               vary=("s", ["86028157", "32452843", "67867967"]))
+        self.assertFalse(result["no_scatter"])
+
+    def test_a_restart_file_with_culled_granules(self):
+        pack = f"fix ins all insert/pack seed 86028157 distributiontemplate pdd insert_every once {PLACE} particles_in_region 60\n"
+        engine.run_liggghts(self.write("fill.in", f"{HEAD}{pack}{LINE}run 12000\nunfix ins\nwrite_restart bed.restart\n"), self.folder, self.folder / "fill.log")
+        self.assertTrue(restarts.holds_culled(self.folder / "bed.restart"))
+        head = HEAD.replace("create_box 1 reg", "read_restart bed.restart")
+        deck = self.write("in.deck", f"{head}{LINE}variable h equal bound(all,zmax)\nprint \"${{h}}\"\nunfix grav\nfix grav all gravity 9.81 vector 1 0 -1\nrun 1000\n")
+        result, _ = twins.compare(deck, ["ke"], out=self.folder / "out", culled=2)
+        self.assertEqual((result["ledger"]["granules"], result["ledger"]["lost"], result["no_scatter"]), (60, 0, False))
 
 
 class Pictures(Folder):

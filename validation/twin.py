@@ -3,14 +3,19 @@
 
     validation/twin.py in.pile --metrics c_height,ke:max,f_wall[3]:mean
 
-Runs the deck unculled (three times, 1e-5 granule diameters apart: their scatter is the noise floor) and culled, and
+Runs the deck unculled (three times, all granules 1e-5 diameters apart: their scatter is the noise floor) and culled, and
 prints a table: granules, loop times, and each metric's error beside the noise floor. A metric is a thermo column, with
 `:end` (default), `:max`, `:min` or `:mean` over the rows printed after the fix line. A culled metric is good when it lies
 within the margin, the larger of 2 % and the noise floor, of the unculled mean.
 
 Every run works in the deck's own folder, so relative paths hold, and what the deck itself writes is written again by
 each run (the last is a culled one). A deck that wants them apart uses the variable `twin`: every run is given its own
-name in it (unculled-1, culled-1, ...). Exit: 0 all good, 1 a metric outside its margin or a granule lost, 2 no result.
+name in it (unculled-1, culled-1, ...).
+
+Granules are moved apart as soon as there are any. Where none are there before a run behind the fix line, all runs go in parts until
+some are. A deck with a seed or a start of its own may vary that instead: `--vary NAME=a,b,c` gives `variable NAME index ...` another
+value in each unculled run; the first culled run has the first value. A line that has no meaning without the fix, as `delete_atoms
+region` with the interface mesh, ends the comparison. Exit: 0 all good, 1 a metric outside its margin or a granule lost, 2 no result.
 """
 import argparse
 import json

@@ -10,6 +10,7 @@
 #include "body_changes.h"
 #include "input_error.h"
 #include "numbers.h"
+#include "word_sum.h"
 
 namespace solidcull {
 namespace {
@@ -285,15 +286,52 @@ void Culling::leave_lists() {
 void Culling::show_bed() {
   if (!p_.solid.has_store() || !p_.census.something_locked() || p_.shown.shown()) return;
   leave_lists();
-  p_.ports.ranks.update();
   p_.lost.remember();
   p_.shown.show();
-  p_.ports.atoms.publish_counts(p_.census.stored());
+  p_.ports.atoms.count_more(p_.census.stored());
+  show_unfinished_ = true;
+}
+
+void Culling::finish_show() {
+  if (!show_unfinished_) return;
+  show_unfinished_ = false;
+  p_.ports.ranks.update();
+  p_.ports.atoms.publish_counts(0);
+}
+
+void Culling::lend_contacts() {
+  p_.ports.memory.give_bins_back();
+  p_.shown.give_contacts();
+}
+
+void Culling::take_contacts_back() {
+  leave_lists();
+  p_.shown.take_contacts();
+  p_.ports.atoms.publish_counts(0);
 }
 
 void Culling::granules_may_change() {
   proposal_dropped_ = proposal_dropped_ || proposal_.any_here();
   proposal_ = {};
+}
+
+std::uint64_t Culling::sum_of_granules() const {
+  WordSum sum;
+  const Atoms& atoms = p_.ports.atoms;
+  for (int i = 0; i < atoms.owned; ++i) {
+    for (const Vec3& v : {atoms.place(i), atoms.velocity(i), atoms.spin(i)})
+      for (int d = 0; d < 3; ++d) sum.add(v[d]);
+    for (const double x : {atoms.radius[i], atoms.mass[i], double(atoms.type[i]), double(atoms.groups[i])}) sum.add(x);
+  }
+  return sum.value();
+}
+
+void Culling::remember_granules() {
+  if (proposal_.any_here()) granules_sum_ = sum_of_granules();
+}
+
+void Culling::see_granules_again() {
+  if (proposal_.any_here() && granules_sum_ != sum_of_granules()) granules_may_change();
 }
 
 bool Culling::culls_of(int groups) const {
@@ -307,6 +345,7 @@ bool Culling::culls_of(int groups) const {
 
 void Culling::hide_bed() {
   if (!p_.shown.shown()) return;
+  finish_show();
   hide_guests();
   p_.ports.atoms.publish_counts(-p_.census.stored());
 }

@@ -41,10 +41,20 @@ class Culling {
   void end_run();
 
   // --- between runs
-  /// All granules are atoms, as in the unculled deck, until hide_bed(); nothing if they are already, or none is culled.
+  /// All granules are atoms, as in the unculled deck, until hide_bed(); nothing if they are already, or none is culled. Local;
+  /// finish_show() follows before the next collective function.
   void show_bed();
+  /// What show_bed() leaves for later where it was called on one rank alone: the engine's map of tags, for one. Collective.
+  void finish_show();
+  /// The engine is about to compute forces of all granules, and has. Between them it has the contacts within bodies too.
+  /// Collective.
+  void lend_contacts();
+  void take_contacts_back();
   /// A command may do anything to granules: what the last look chose to be culled is not known to rest any more. Local.
   void granules_may_change();
+  /// A program may, until the second call: then they are known to rest where it has not. Local.
+  void remember_granules();
+  void see_granules_again();
   /// Whether a culled granule may be in one of these engine groups (bits). Collective.
   bool culls_of(int groups) const;
   /// What was culled and not changed is culled again; what was changed wakes when the run begins.
@@ -55,12 +65,13 @@ class Culling {
   std::int64_t restore_all();
 
   // --- state
-  double value(int n) { return p_.report.value(n); }       ///< f_ID[n + 1]
-  const std::map<int, InterfaceMesh>& interface_meshes();  ///< by body; between runs, as the last run left them. Local
-  double largest_radius(int type) const;                   ///< of what is or was stored (m). Local
-  void enclose_stored(Box& box) const;                     ///< the box must not be smaller. Local
-  double memory_bytes() const;                             ///< local
-  std::vector<double> restart_state();                     ///< on rank 0; the first number is how many
+  double value(int n) { return p_.report.value(n); }          ///< f_ID[n + 1]
+  const std::map<int, InterfaceMesh>& interface_meshes();     ///< by body; between runs, as the last run left them. Local
+  std::int64_t stored() const { return p_.census.stored(); }  ///< interior granules of all ranks. Local
+  double largest_radius(int type) const;                      ///< of what is or was stored (m). Local
+  void enclose_stored(Box& box) const;                        ///< the box must not be smaller. Local
+  double memory_bytes() const;                                ///< local
+  std::vector<double> restart_state();                        ///< on rank 0; the first number is how many
   /// What goes with the state of a restart file, at the end of the file.
   void append_restart(const std::string& file) { p_.snapshot.append_to(file); }
   /// file: what the state was read from.
@@ -81,6 +92,7 @@ class Culling {
     stepping
   };
   void expect(std::initializer_list<Phase> phases, const char* where) const;
+  std::uint64_t sum_of_granules() const;
 
   void find_scales();
   void leave_lists();
@@ -113,11 +125,13 @@ class Culling {
   Phase phase_ = Phase::between_runs;
   Proposal proposal_;  // of the last look, until the next change
   bool proposal_dropped_ = false;
+  std::uint64_t granules_sum_ = 0;   // see remember_granules()
   bool inner_pairs_listed_ = false;  // the neighbour lists are new: pairs within bodies stand in them
   bool told_of_file_ = false;        // that restart files of this run hold more than atoms
   bool bodies_are_fast_ = false;     // some body may come too far between two times when ranks talk
   std::int64_t restored_then_ = 0;   // granules restored on this rank until culling was judged last
   bool surface_drawn_ = false;       // at the last look
+  bool show_unfinished_ = false;     // the bed is shown on this rank, and other ranks may not know
   bool loads_are_none_ = false;      // nothing was culled when they were taken last
   bool walls_are_felt_ = true;       // since the run began, by what stands at them
 };

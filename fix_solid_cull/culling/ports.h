@@ -104,6 +104,8 @@ class Atoms {
   /// The engine learns how many atoms there are; `returned`: that came out of the store (negative: went in), over all ranks, so
   /// that it misses none. Collective.
   virtual void publish_counts(std::int64_t returned) = 0;
+  /// So many more atoms, over all ranks, have come out of the store as publish_counts() has told: until then. Local.
+  virtual void count_more(std::int64_t returned) = 0;
   virtual void sort_soon() = 0;  ///< many atoms are new: the engine should sort them
 };
 

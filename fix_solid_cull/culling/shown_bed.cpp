@@ -87,6 +87,75 @@ void ShownBed::stand_in_for_missing(Arrivals& arrivals) const {
   }
 }
 
+// ------------------------------------------------------------------------------------------------------------ contacts
+
+ShownBed::KnownContacts ShownBed::contacts_of(const HistoryRows& rows, int i, std::int64_t tag) {
+  KnownContacts c{tag, {}, {}};
+  rows.for_each_partner(i, [&](std::int64_t partner, const double* history) {
+    c.partners.push_back(partner);
+    c.numbers.insert(c.numbers.end(), history, history + rows.width);
+  });
+  return c;
+}
+
+/// With other locked granules of its body; without those that have no history.
+ShownBed::KnownContacts ShownBed::contacts_in_body(std::int64_t tag, bool stored, int body) const {
+  const FrozenContacts& frozen = solid_.contacts();
+  KnownContacts c{tag, {}, {}};
+  std::vector<double> history(frozen.width());
+  const auto add = [&](std::int64_t partner) {
+    frozen.turn(history.data(), solid_.bodies().pose(body).turn());
+    c.partners.push_back(partner);
+    c.numbers.insert(c.numbers.end(), history.begin(), history.end());
+  };
+  frozen.for_each_here(tag, [&](std::int64_t partner, const double* known) {
+    if (!known) return;
+    history.assign(known, known + frozen.width());
+    add(partner);
+  });
+  if (!stored) return c;
+  const auto granule = solid_.store().find(tag);
+  frozen.for_each_elsewhere(tag, [&](std::int64_t partner) {
+    if (solid_.inner_history(*granule, partner, history.data())) add(partner);
+  });
+  return c;
+}
+
+void ShownBed::give(int i, const KnownContacts& contacts) {
+  const std::size_t width = solid_.contacts().width();
+  std::vector<Contacts::History> rows;
+  for (std::size_t k = 0; k < contacts.partners.size(); ++k)
+    rows.push_back({contacts.partners[k], contacts.numbers.data() + k * width});
+  ports_.contacts.give_histories(i, rows.data(), rows.size());
+}
+
+void ShownBed::give_contacts() {
+  outer_.clear();
+  if (!shown_ || solid_.contacts().width() == 0) return;
+  AtomIndex atoms;  // guests are in none of the culling's own
+  atoms.index(ports_.atoms);
+  const HistoryRows rows = ports_.contacts.histories();
+  for (std::size_t k = 0; k < granules_.size(); ++k) {
+    const Shown& s = granules_[k];
+    const int* i = atoms.find(s.tag);
+    if (!i) continue;  // the deck has deleted it, or sent it to another rank
+    if (!s.stored) outer_.push_back(contacts_of(rows, *i, s.tag));
+    const int body = s.stored ? solid_.store().find(s.tag)->body : interface_[k].state.body;
+    give(*i, contacts_in_body(s.tag, s.stored, body));
+  }
+}
+
+void ShownBed::take_contacts() {
+  if (!shown_ || solid_.contacts().width() == 0) return;
+  AtomIndex atoms;
+  atoms.index(ports_.atoms);
+  for (const Shown& s : granules_)
+    if (const int* i = atoms.find(s.tag)) ports_.contacts.clear_histories(*i);
+  for (const KnownContacts& c : outer_)
+    if (const int* i = atoms.find(c.tag)) give(*i, c);
+  outer_.clear();
+}
+
 // ------------------------------------------------------------------------------------------------------------ back
 
 void ShownBed::hide() {
@@ -213,13 +282,7 @@ void ShownBed::give_changes() {
 void ShownBed::give(int i, const Change& change) {
   Atoms& atoms = ports_.atoms;
   const std::int64_t tag = atoms.tag[i];
-  std::vector<std::int64_t> partners;
-  std::vector<double> numbers;
-  const HistoryRows rows = ports_.contacts.histories();
-  rows.for_each_partner(i, [&](std::int64_t partner, const double* history) {
-    partners.push_back(partner);
-    numbers.insert(numbers.end(), history, history + rows.width);
-  });
+  const KnownContacts contacts = contacts_of(ports_.contacts.histories(), i, tag);
   ports_.contacts.clear_histories(i);
   shell_.reset(i);
   const Vec3 place = atoms.place(i);
@@ -231,10 +294,7 @@ void ShownBed::give(int i, const Change& change) {
   if (scales_.refills() && !change.moved) atoms.set_place(now, place);  // as it was packed when it woke
   atoms.mark_interface(now, false);
   ports_.contacts.clear_histories(now);
-  std::vector<Contacts::History> contacts;
-  for (std::size_t k = 0; k < partners.size(); ++k)
-    contacts.push_back({partners[k], numbers.data() + k * static_cast<std::size_t>(rows.width)});
-  ports_.contacts.give_histories(now, contacts.data(), contacts.size());
+  give(now, contacts);
   index_.set(tag, now);
 }
 

@@ -29,6 +29,10 @@ class ShownBed : public FollowsAtoms {
   void show();
   /// The interface granules as they were shown: commands may have deleted some or sent them elsewhere. Local.
   void stand_in_for_missing(Arrivals& arrivals) const;
+  /// The engine has the contacts within bodies too, as long as it computes forces of all granules. Then it has them no more.
+  /// Local.
+  void give_contacts();
+  void take_contacts();
   /// Guests go; what was changed asks to wake. Collective.
   void hide();
   /// All engine groups, as bits, of the guests that hide() saw. Local.
@@ -65,6 +69,11 @@ class ShownBed : public FollowsAtoms {
     Locked state;
     Vec3 velocity, spin;  // that of its body
   };
+  struct KnownContacts {
+    std::int64_t tag;
+    std::vector<std::int64_t> partners;
+    std::vector<double> numbers;
+  };
   struct Change {
     bool deleted = false, moved = false;  // moved: by the deck
     int layout = 0;
@@ -74,6 +83,9 @@ class ShownBed : public FollowsAtoms {
   void show_interface();
   void show_stored();
   void note(int i, bool stored, std::uint64_t sum);
+  static KnownContacts contacts_of(const HistoryRows& rows, int i, std::int64_t tag);
+  KnownContacts contacts_in_body(std::int64_t tag, bool stored, int body) const;
+  void give(int i, const KnownContacts& contacts);
   std::uint64_t sum_of(const std::vector<double>& record) const;
   bool is_as_shown(const Shown& s, int i) const;
   void bring_strangers_home(std::vector<int>& at);
@@ -95,6 +107,7 @@ class ShownBed : public FollowsAtoms {
   std::vector<Interface> interface_;  // by number: the first ones are interface granules
   std::vector<int> motion_words_;     // of a record, in their order
   std::vector<double> record_;        // of one granule
+  std::vector<KnownContacts> outer_;  // of interface granules, while those within bodies are given
   std::vector<Vec3> asking_;          // places of those that are to wake
   std::map<std::int64_t, Change> changes_;
 };

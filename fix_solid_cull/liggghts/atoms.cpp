@@ -133,6 +133,16 @@ void EngineAtoms::publish_counts(std::int64_t returned) {
   renew();
 }
 
+/// The map has room for the tags that it had room for, and they are all that there are as a rule.
+void EngineAtoms::count_more(std::int64_t returned) {
+  atom->natoms += returned;
+  if (output->thermo) engine::expect_atoms(*output->thermo, static_cast<long>(returned));
+  const int highest_here = atom->nlocal ? *std::max_element(atom->tag, atom->tag + atom->nlocal) : 0;
+  if (!atom->map_style || !map_cleared_ || highest_here >= atom->get_map_size()) return;
+  atom->map_set();
+  map_cleared_ = false;
+}
+
 void EngineAtoms::sort_soon() {
   if (atom->sortfreq > 0) atom->nextsort = update->ntimestep;
 }

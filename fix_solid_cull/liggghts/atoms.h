@@ -42,6 +42,7 @@ class EngineAtoms : public Atoms, protected LAMMPS_NS::Pointers {
   std::string layout_text(int layout) const override { return records_.layout_text(layout); }
   int layout_from_text(const std::string& text) override { return records_.layout_from_text(text); }
   void publish_counts(std::int64_t returned) override;
+  void count_more(std::int64_t returned) override;
   void sort_soon() override;
 
  private:

@@ -1,7 +1,6 @@
 #include "command_styles.h"
 
 #include <algorithm>
-#include <cctype>
 #include <initializer_list>
 
 #include "compute_styles.h"
@@ -52,7 +51,9 @@ constexpr CommandStyle styles[] = {
     {"newton", nothing},
     {"next", nothing},
     {"package", nothing},
-    {"pair_*", nothing},
+    {"pair_coeff", nothing},
+    {"pair_modify", nothing},
+    {"pair_write", nothing},
     {"partition", nothing},
     {"print", nothing},
     {"processors", nothing},
@@ -92,6 +93,7 @@ constexpr CommandStyle styles[] = {
     {"write_dump", whole_bed},
 
     {"change_box", all_restored},
+    {"pair_style", all_restored},
     {"read_data", all_restored},
     {"read_dump", all_restored},
     {"read_restart", all_restored},
@@ -138,34 +140,6 @@ std::string only_group_of(const std::string& command, const std::vector<std::str
   if (command == "set" && words[0] == "group") return words[1];
   if (command == "velocity" && words[1] == "set") return words[0];  // other words count all granules, or their temperature
   return "";
-}
-
-bool reads_granules(const std::string& formula) {
-  const auto in_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
-  for (std::size_t at = 0; at < formula.size();) {
-    if (std::isdigit(static_cast<unsigned char>(formula[at])) || formula[at] == '.') {  // 1e-3 is no word
-      while (at < formula.size() && (in_word(formula[at]) || formula[at] == '.')) ++at;
-      continue;
-    }
-    if (!in_word(formula[at])) {
-      ++at;
-      continue;
-    }
-    std::size_t end = at;
-    while (end < formula.size() && in_word(formula[end])) ++end;
-    const std::string word = formula.substr(at, end - at);
-    at = end;
-    if (word.compare(0, 2, "v_") == 0) continue;  // evaluated for itself
-    if (is_one_of(word, {"PI",       "sqrt",    "exp",    "ln",      "log",       "abs",     "sin",       "cos",   "tan",
-                         "asin",     "acos",    "atan",   "atan2",   "random",    "normal",  "ceil",      "floor", "round",
-                         "ramp",     "stagger", "stride", "logfreq", "vdisplace", "swiggle", "cwiggle",   "step",  "elapsed",
-                         "elaplong", "dt",      "time",   "cpu",     "tpcpu",     "spcpu",   "cpuremain", "part",  "vol",
-                         "lx",       "ly",      "lz",     "xlo",     "xhi",       "ylo",     "yhi",       "zlo",   "zhi",
-                         "xy",       "xz",      "yz",     "xlat",    "ylat",      "zlat"}))
-      continue;
-    return true;
-  }
-  return false;
 }
 
 }  // namespace solidcull

@@ -27,7 +27,4 @@ Sight sight_of(const std::string& command, const std::vector<std::string>& words
 /// The only group on which a command that sees the whole bed can act, or an empty word.
 std::string only_group_of(const std::string& command, const std::vector<std::string>& words);
 
-/// Whether a variable's formula reads granules, or what was computed of them.
-bool reads_granules(const std::string& formula);
-
 }  // namespace solidcull

@@ -2,55 +2,35 @@
 
 #include <algorithm>
 #include <cstring>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "command_styles.h"
-#include "compute.h"
 #include "deck_rules.h"
 #include "error.h"
 #include "fix_solid_cull.h"
+#include "formulas.h"
 #include "group.h"
 #include "lammps.h"
 #include "modify.h"
-#include "neigh_request.h"
-#include "neighbor.h"
 #include "restart_files.h"
 #include "update.h"
+#include "whole_bed_forces.h"
 
 namespace solidcull {
 
 namespace {
 
 std::set<const LAMMPS_NS::LAMMPS*> with_void_lists;
+struct Known {
+  int numbers = 0, forces = 0;  // of all granules, as of the show of the bed that has this number
+};
+std::map<const LAMMPS_NS::LAMMPS*, Known> known;
 bool histories_stay = false;  // in delete_atoms
 
 bool lists_are_void(const LAMMPS_NS::LAMMPS* lmp) { return with_void_lists.count(lmp) != 0; }
-
-bool needs_lists(LAMMPS_NS::LAMMPS* lmp, const LAMMPS_NS::Compute* c) {
-  const LAMMPS_NS::Neighbor* neighbor = lmp->neighbor;
-  return std::any_of(neighbor->requests, neighbor->requests + neighbor->nrequest,
-                     [&](const LAMMPS_NS::NeighRequest* r) { return r->requestor == c; });
-}
-
-/// What was computed of atoms at the last step is computed of the whole bed; what needs forces or neighbours can't be.
-void compute_again(LAMMPS_NS::LAMMPS* lmp) {
-  LAMMPS_NS::Modify* modify = lmp->modify;
-  const LAMMPS_NS::bigint step = lmp->update->ntimestep;
-  modify->clearstep_compute();
-  for (int c = 0; c < modify->ncompute; ++c) {
-    LAMMPS_NS::Compute* compute = modify->compute[c];
-    const bool lists = needs_lists(lmp, compute);
-    if (compute->invoked_peratom == step && lists) compute->invoked_peratom = -1;  // it has no rows for what was stored
-    if (lists || compute->peflag || compute->pressflag || compute->peatomflag || compute->pressatomflag) continue;
-    if (compute->invoked_peratom == step) compute->compute_peratom();
-    if (compute->scalar_flag && compute->invoked_scalar == step) compute->compute_scalar();
-    if (compute->vector_flag && compute->invoked_vector == step) compute->compute_vector();
-    if (compute->array_flag && compute->invoked_array == step) compute->compute_array();
-  }
-  modify->clearstep_compute();
-}
 
 /// Whether no culled granule is in the only group on which the command acts.
 bool leaves_culled_alone(LAMMPS_NS::LAMMPS* lmp, FixSolidCull& fix, const std::string& group) {
@@ -59,15 +39,25 @@ bool leaves_culled_alone(LAMMPS_NS::LAMMPS* lmp, FixSolidCull& fix, const std::s
   return number >= 0 && !fix.culls_of(lmp->group->bitmask[number]);
 }
 
-void show(LAMMPS_NS::LAMMPS* lmp, FixSolidCull& fix) {
-  if (fix.show_bed()) compute_again(lmp);
+/// Numbers that were computed in the last step are computed again, of all granules.
+void bring_up_to_date(LAMMPS_NS::LAMMPS* lmp, FixSolidCull& fix) {
+  known[lmp].numbers = fix.show_number();
+  if (!some_current_number_needs_forces(lmp)) {
+    compute_again(lmp);
+    return;
+  }
+  const WholeBedForces forces(lmp, fix);
+  compute_again(lmp);
+  known[lmp].forces = fix.show_number();
 }
 
-/// The atoms of a restart file are not the whole bed until a fix has taken up the rest.
+void restore(LAMMPS_NS::LAMMPS* lmp, FixSolidCull& fix, const char* command) {
+  if (fix.restore_all(command)) bring_up_to_date(lmp, fix);
+}
+
 void refuse_part_of_a_bed(LAMMPS_NS::LAMMPS* lmp, FixSolidCull* fix, const std::string& where) {
-  if (fix && fix->waits_for_run()) fix->refuse_before_first_run(where);
-  const std::string lost = state_that_no_fix_has(*lmp->modify);
-  if (!lost.empty()) lmp->error->all(FLERR, (lost + ", and 'run 0' " + where).c_str());
+  const std::string why = part_of_a_bed(lmp, fix, where);
+  if (!why.empty()) lmp->error->all(FLERR, why.c_str());
 }
 
 /// A run that is to go on without a set-up, where there is nothing to go on with.
@@ -89,6 +79,16 @@ bool has_commands(char** words, int n) {
 bool is_own_line(const char* command, char** words, int n) {
   return n > 2 && std::strcmp(command, "fix") == 0 && std::strcmp(words[2], "solid/cull") == 0;
 }
+bool is(const char* command, const char* name) { return std::strcmp(command, name) == 0; }
+
+/// What names of the deck stand for.
+void remember(LAMMPS_NS::LAMMPS* lmp, const char* command, const std::vector<std::string>& words) {
+  if (words.size() < 3) return;
+  const std::vector<std::string> rest(words.begin() + 2, words.end());
+  if (is(command, "compute")) sources(lmp).was_made("c_" + words[0], rest);
+  if (is(command, "fix")) sources(lmp).was_made("f_" + words[0], rest);
+  if (is(command, "variable")) sources(lmp).variable_was_made(words[0], rest);
+}
 
 }  // namespace
 
@@ -109,14 +109,18 @@ MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, 
   // fix insert/stream then moves the step at which each granule was released
   if (resets_ && lmp->modify->find_fix(releases_id) >= 0) sight = Sight::whole_bed;
   if (is_own_line(command, words, n)) sight = fix ? Sight::all_restored : Sight::nothing;
+  if (is(command, "pair_style") && (!fix || fix->waits_for_run())) sight = Sight::nothing;  // it comes right after read_restart
+  if (fix && !fix->waits_for_run() && !fix->in_run() && is(command, "unfix") && n > 0 && is(words[0], fix->id))
+    restore(lmp, *fix, nullptr);  // numbers may be read after the fix has gone
+  remember(lmp, command, line);
   const bool reads = sight == Sight::whole_bed || sight == Sight::all_restored;
   if (reads) refuse_part_of_a_bed(lmp, fix, std::string("before '") + command + "'");
   if (sight == Sight::run && (lists_are_void(lmp) || (fix && has_commands(words, n)))) set_up_after_all(words, n);
   if (fix && !fix->in_run()) {
     if (sight == Sight::state) fix->hide_bed();
     if (sight == Sight::whole_bed) fix->granules_may_change();
-    if (sight == Sight::whole_bed && !leaves_culled_alone(lmp, *fix, only_group_of(command, line))) show(lmp, *fix);
-    if (sight == Sight::all_restored) fix->restore_all(command);
+    if (sight == Sight::whole_bed && !leaves_culled_alone(lmp, *fix, only_group_of(command, line))) show(lmp, *fix, false);
+    if (sight == Sight::all_restored) restore(lmp, *fix, command);
   }
   if (n == 1 && std::strcmp(command, "read_restart") == 0) remember_read(lmp, words[0]);
   histories_stay = lists_are_void(lmp) && std::strcmp(command, "delete_atoms") == 0;
@@ -129,14 +133,38 @@ MetCommand::~MetCommand() {
   if (FixSolidCull* fix = fix_of(lmp_)) fix->time_was_reset(lmp_->update->ntimestep - step_);
 }
 
+std::string part_of_a_bed(LAMMPS_NS::LAMMPS* lmp, const FixSolidCull* fix, const std::string& where) {
+  if (fix && fix->waits_for_run()) return fix->before_first_run(where);
+  const std::string lost = state_that_no_fix_has(*lmp->modify);
+  return lost.empty() ? lost : lost + ", and 'run 0' " + where;
+}
+
+void show(LAMMPS_NS::LAMMPS* lmp, FixSolidCull& fix, bool forces) {
+  fix.show_bed();
+  if (!fix.bed_is_shown()) return;
+  if (known[lmp].numbers != fix.show_number()) bring_up_to_date(lmp, fix);
+  if (!forces || known[lmp].forces == fix.show_number()) return;
+  const WholeBedForces computed(lmp, fix);
+  known[lmp].forces = fix.show_number();
+}
+
+void refuse_value_of_atoms(LAMMPS_NS::LAMMPS* lmp, const std::string& formula) {
+  FixSolidCull* const fix = fix_of(lmp);
+  if (!fix) return;
+  const std::string missed = fix_that_missed_granules(formula, lmp, [&](int groups) { return fix->culls_of(groups); });
+  if (!missed.empty()) fix->refuse_value_of_atoms(formula, missed);
+}
+
 void met_formula(LAMMPS_NS::LAMMPS* lmp, const char* formula) {
-  if (!lmp->modify) return;
+  if (!lmp->modify || WholeBedForces::at_work()) return;
   FixSolidCull* fix = fix_of(lmp);
   constexpr int between_runs = 0;
   if (fix ? fix->in_run() : lmp->update->whichflag != between_runs) return;
-  if (!reads_granules(formula)) return;
+  const Reads reads = reads_of(formula, lmp);
+  refuse_value_of_atoms(lmp, formula);
+  if (reads == Reads::nothing) return;
   refuse_part_of_a_bed(lmp, fix, std::string("before the variable '") + formula + "'");
-  if (fix) show(lmp, *fix);
+  if (fix) show(lmp, *fix, reads == Reads::forces);
 }
 
 void run_begins(LAMMPS_NS::LAMMPS* lmp) {

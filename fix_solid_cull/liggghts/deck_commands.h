@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 namespace LAMMPS_NS {
 class LAMMPS;
@@ -27,6 +28,13 @@ class MetCommand {
   bool resets_ = false;
 };
 
+/// One line where the atoms of a restart file are not the whole bed until a fix has taken up the rest; else empty. Local.
+std::string part_of_a_bed(LAMMPS_NS::LAMMPS* lmp, const FixSolidCull* fix, const std::string& where);
+/// Stops the program with one line where the formula reads what a fix has measured of atoms only, see formulas.h. Collective.
+void refuse_value_of_atoms(LAMMPS_NS::LAMMPS* lmp, const std::string& formula);
+/// Stored granules are atoms until the next run, and numbers of the last step are of all; forces: theirs are computed. Between
+/// runs only. Collective.
+void show(LAMMPS_NS::LAMMPS* lmp, FixSolidCull& fix, bool forces);
 /// Between runs only. Collective.
 void met_formula(LAMMPS_NS::LAMMPS* lmp, const char* formula);
 /// Before the engine sets up a run. Collective.

@@ -223,8 +223,10 @@ void set_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_
   (atom.*member(SortSetup()))();
 }
 
+void* found_symbol(const char* name) { return dlsym(RTLD_NEXT, name); }
+
 void* next_symbol(const char* mangled) {
-  if (void* const found = dlsym(RTLD_NEXT, mangled)) return found;
+  if (void* const found = found_symbol(mangled)) return found;
   std::fprintf(stderr, "ERROR: solidcull: this LIGGGHTS has no '%s': use LIGGGHTS-PUBLIC 3.8.0 as Debian builds it\n", mangled);
   std::abort();
 }

@@ -31,6 +31,8 @@ using FixCreator = LAMMPS_NS::Fix* (*)(LAMMPS_NS::LAMMPS*, int, char**);
 
 /// The engine's own function behind one that this library interposes; ends the program with one line where there is none.
 void* next_symbol(const char* mangled);
+/// Likewise; nullptr where there is none.
+void* found_symbol(const char* name);
 template <Call call, class Function>
 Function own() {
   constexpr const char* symbol = symbol_of(call);

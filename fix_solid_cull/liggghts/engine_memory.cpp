@@ -42,12 +42,12 @@ int EngineMemory::fair(int left) const { return std::max(worth_the_trouble, 2 * 
 
 void EngineMemory::give_rows_back(int left) {
   const int rows = std::max(atom->nlocal, fair(left) + 1);
-  if (rows >= atom->nmax) return;
+  if (arrays_stay_ || rows >= atom->nmax) return;
   atom->avec->grow(rows);
   atoms_.renew();
 }
 
-bool EngineMemory::too_large() const { return atom->nmax > fair(atom->nlocal); }
+bool EngineMemory::too_large() const { return !arrays_stay_ && atom->nmax > fair(atom->nlocal); }
 
 void EngineMemory::fit() {
   const int fitting = room * (atom->nlocal + 1000);

@@ -18,6 +18,8 @@ class EngineMemory : public Memory, protected LAMMPS_NS::Pointers {
   EngineMemory(LAMMPS_NS::LAMMPS* lmp, EngineAtoms& atoms, EngineContacts& contacts)
       : Pointers(lmp), atoms_(atoms), contacts_(contacts) {}
 
+  /// A program keeps pointers into the arrays: they are not cut from now on.
+  void keep_arrays() { arrays_stay_ = true; }
   /// Neighbour lists and the histories in them, a third of what a bed takes.
   void make_room(std::size_t granules) override;
   void give_rows_back(int left) override;
@@ -40,7 +42,7 @@ class EngineMemory : public Memory, protected LAMMPS_NS::Pointers {
   EngineAtoms& atoms_;
   EngineContacts& contacts_;
   std::size_t freed_ = 0;  // since the last trim
-  bool wide_ = false;
+  bool wide_ = false, arrays_stay_ = false;
   engine::BinEdges ours_{};  // while they are wide (m)
 };
 

@@ -82,10 +82,9 @@ int FixSolidCull::setmask() {
          FINAL_INTEGRATE | END_OF_STEP;
 }
 
-void FixSolidCull::refuse(const std::string& why) {
-  const std::string line = "fix " + std::string(id) + " solid/cull: " + why;
-  error->all(__FILE__, __LINE__, line.c_str());
-}
+std::string FixSolidCull::line(const std::string& what) const { return "fix " + std::string(id) + " solid/cull: " + what; }
+
+void FixSolidCull::refuse(const std::string& why) { error->all(__FILE__, __LINE__, line(why).c_str()); }
 
 void FixSolidCull::broken(const std::string& what) {
   fail("internal error " + where() + ": " + what + "; please report it with the deck");
@@ -96,10 +95,10 @@ std::string FixSolidCull::where() const {
 }
 
 void FixSolidCull::fail(const std::string& why) {
-  const std::string line = "fix " + std::string(id) + " solid/cull: " + why;
-  std::fprintf(stderr, "ERROR: %s\n", line.c_str());  // MPI_Abort drops what is buffered
+  const std::string told = line(why);
+  std::fprintf(stderr, "ERROR: %s\n", told.c_str());  // MPI_Abort drops what is buffered
   std::fflush(nullptr);
-  error->one(__FILE__, __LINE__, line.c_str());
+  error->one(__FILE__, __LINE__, told.c_str());
 }
 
 void FixSolidCull::renew() {
@@ -223,16 +222,36 @@ void FixSolidCull::run_begins() {
   in_run_ = true;
 }
 
-bool FixSolidCull::show_bed() {
-  return hand_on([&] {
-    const bool before = culling_->bed_is_shown();
-    culling_->show_bed();
-    return !before && culling_->bed_is_shown();
-  });
+void FixSolidCull::show_bed_here() {
+  const bool before = culling_->bed_is_shown();
+  hand_on([&] { culling_->show_bed(); });
+  static int all = 0;  // of all fixes in this process
+  if (culling_->bed_is_shown() && !before) show_ = ++all;
+}
+
+void FixSolidCull::show_bed() {
+  show_bed_here();
+  hand_on([&] { culling_->finish_show(); });
+}
+
+void FixSolidCull::lend_contacts() {
+  hand_on([&] { culling_->lend_contacts(); });
+}
+
+void FixSolidCull::take_contacts_back() {
+  hand_on([&] { culling_->take_contacts_back(); });
 }
 
 void FixSolidCull::granules_may_change() {
   hand_on([&] { culling_->granules_may_change(); });
+}
+
+void FixSolidCull::remember_granules() {
+  hand_on([&] { culling_->remember_granules(); });
+}
+
+void FixSolidCull::see_granules_again() {
+  hand_on([&] { culling_->see_granules_again(); });
 }
 
 bool FixSolidCull::culls_of(int groups) {
@@ -243,16 +262,23 @@ void FixSolidCull::hide_bed() {
   hand_on([&] { culling_->hide_bed(); });
 }
 
-void FixSolidCull::restore_all(const char* command) {
-  hand_on([&] {
-    if (culling_->restore_all() > 0)
-      run_.say("'" + std::string(command) + "' may change which granules there are: all are exterior now");
-  });
+bool FixSolidCull::restore_all(const char* command) {
+  const bool some = hand_on([&] { return culling_->restore_all() > 0; });
+  if (some && command) run_.say("'" + std::string(command) + "' may change which granules there are: all are exterior now");
   vector_atom = culling_->labels();
+  return some;
 }
 
-void FixSolidCull::refuse_before_first_run(const std::string& where) {
-  refuse("the granules that the restart file holds besides the atoms come with the first run: put 'run 0' " + where);
+std::string FixSolidCull::before_first_run(const std::string& where) const {
+  return line("the granules that the restart file holds besides the atoms come with the first run: put 'run 0' " + where);
+}
+
+void FixSolidCull::refuse_value_of_atoms(const std::string& formula, const std::string& measured_by) {
+  refuse("the variable '" + formula + "' reads " + measured_by +
+         ", which has measured atoms only, without the granules that are culled: read what it is made of, which is computed "
+         "again of all "
+         "granules, or one of f_" +
+         id + "[23] to f_" + id + "[28]");
 }
 
 // ------------------------------------------------------------------------------------------------------------ state

@@ -69,17 +69,30 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   // --- between runs; collective
   bool in_run() const { return in_run_; }
   void run_begins();
-  /// True if the bed was not shown before, and is now.
-  bool show_bed();
+  void show_bed();
+  /// On one rank alone; show_bed() on all follows before anything collective. Local.
+  void show_bed_here();
+  int show_number() const { return show_; }                       ///< which show of a bed it was the last time. Local
+  bool bed_is_shown() const { return culling_->bed_is_shown(); }  ///< local
+  std::int64_t stored() const { return culling_->stored(); }      ///< interior granules of all ranks. Local
+  /// The engine computes forces of all granules between these two.
+  void lend_contacts();
+  void take_contacts_back();
   bool culls_of(int groups);
   void granules_may_change();
+  /// A program may change them between these two. Local.
+  void remember_granules();
+  void see_granules_again();
+  void keep_arrays() { memory_.keep_arrays(); }  ///< a program has pointers into them. Local
   void hide_bed();
-  void restore_all(const char* command);
+  /// True if something was culled, which a line then says; nullptr: no line.
+  bool restore_all(const char* command);
   /// The deck counts its steps anew, so much higher.
   void time_was_reset(std::int64_t by) { run_.reset_by += by; }
   /// A restart file was read, and what it holds besides atoms comes with the first run. Local.
-  bool waits_for_run() { return culling_->waits_for_run(); }
-  void refuse_before_first_run(const std::string& where);
+  bool waits_for_run() const { return culling_->waits_for_run(); }
+  std::string before_first_run(const std::string& where) const;  ///< the line that says so
+  void refuse_value_of_atoms(const std::string& formula, const std::string& measured_by);
 
  private:
   /// What goes wrong ends in one line, not in a stack trace.
@@ -90,6 +103,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   auto hand_on(Work work) -> decltype(work());
   void renew();
   void reset_rows(int i);
+  std::string line(const std::string& what) const;
   void refuse(const std::string& why);   // the user's fault; collective
   void broken(const std::string& what);  // ours; local
   void fail(const std::string& why);     // ends the run; local
@@ -106,6 +120,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   DeckRules rules_;
   std::unique_ptr<Culling> culling_;
   bool in_run_ = false;
+  int show_ = 0;
   int write_error_ = 0;  // of the restart file's head
 };
 

@@ -121,6 +121,19 @@ int GranuleRecords::whole_number(double packed) { return static_cast<int>(bits_o
 void GranuleRecords::remove(int i) {
   if (i != atom->nlocal - 1) atom->avec->copy(atom->nlocal - 1, i, 1);
   atom->nlocal--;
+  blank(atom->nlocal);
+}
+
+/// What the engine sets for no new granule is zero in rows that never had one: forces, and columns of fixes without defaults.
+void GranuleRecords::blank(int row) {
+  std::fill_n(atom->f[row], 3, 0.0);
+  std::fill_n(atom->torque[row], 3, 0.0);
+  for (int e = 0; e < atom->nextra_grow; ++e) {
+    LAMMPS_NS::Fix* fix = modify->fix[atom->extra_grow[e]];
+    if (fix == own_ || fix->create_attribute) continue;
+    if (zeros_.empty()) zeros_.resize(longest_column);
+    fix->unpack_exchange(row, zeros_.data());
+  }
 }
 
 int GranuleRecords::append(const std::vector<double>& record, int layout) {
@@ -149,10 +162,8 @@ int GranuleRecords::append(const std::vector<double>& record, int layout) {
     else
       fix->set_arrays(i);
   }
-  for (int d = 0; d < 3; ++d) {
-    atom->f[i][d] = 0;
-    atom->torque[i][d] = 0;
-  }
+  std::fill_n(atom->f[i], 3, 0.0);
+  std::fill_n(atom->torque[i], 3, 0.0);
   return i;
 }
 

@@ -24,7 +24,7 @@ class GranuleRecords : protected LAMMPS_NS::Pointers {
   /// Which number of a record is the granule's groups, likewise; and such a number as it is packed.
   int groups_word(int i);
   static int whole_number(double packed);
-  /// Deletes owned granule i; the last owned granule takes its index.
+  /// Deletes owned granule i; the last owned granule takes its index, and its row is as if no granule had been there.
   void remove(int i);
   /// Appends a granule from its record and returns its index. Fixes that were not there when it was packed set their defaults.
   int append(const std::vector<double>& record, int layout);
@@ -43,12 +43,13 @@ class GranuleRecords : protected LAMMPS_NS::Pointers {
   using Layout = std::vector<Column>;
   int number_of(const Layout& layout);
   bool is_last_layout() const;
+  void blank(int row);
 
   const LAMMPS_NS::Fix* own_;
   std::vector<Layout> layouts_;
   int last_layout_ = -1;
   std::vector<int> lengths_;
-  std::vector<double> packed_, unpacked_;  // of one granule
+  std::vector<double> packed_, unpacked_, zeros_;  // of one granule
 };
 
 }  // namespace solidcull

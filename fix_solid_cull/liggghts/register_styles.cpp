@@ -16,12 +16,14 @@
 #include "memory.h"
 #include "mesh_loads.h"
 #include "modify.h"
+#include "program_calls.h"
 #include "region_interface_mesh.h"
 #include "restart_files.h"
 #include "solidcull.h"
 #include "update.h"
 #include "variable.h"
 #include "wall_contacts.h"
+#include "whole_bed_forces.h"
 #include "write_restart.h"
 
 namespace {
@@ -85,6 +87,29 @@ int Input::execute_command() {
   return original(this);
 }
 
+// How a program has commands done; the engine does too, within one of these.
+char* Input::one(const char* command) {
+  using Original = char* (*)(Input*, const char*);
+  static const auto original = own<Call::one_command, Original>();
+  const solidcull::ProgramCall call(lmp, solidcull::ProgramCall::By::classes);
+  return original(this, command);
+}
+
+void Input::file(const char* name) {
+  using Original = void (*)(Input*, const char*);
+  static const auto original = own<Call::named_deck, Original>();
+  const solidcull::ProgramCall call(lmp, solidcull::ProgramCall::By::classes);
+  original(this, name);
+}
+
+void Input::file() {
+  using Original = void (*)(Input*);
+  static const auto original = own<Call::own_deck, Original>();
+  using By = solidcull::ProgramCall::By;
+  const solidcull::ProgramCall call(lmp, solidcull::is_own_program() ? By::library : By::classes);
+  original(this);
+}
+
 /// Formulas are evaluated between runs too, where a command names a variable.
 double Variable::evaluate(char* str, Tree** tree) {
   using Original = double (*)(Variable*, char*, Tree**);
@@ -114,6 +139,7 @@ void WriteRestart::write(char* file) {
 void FixMeshSurface::add_particle_contribution(int ip, double* frc, double* delta, int iTri, double* v_wall) {
   using Original = void (*)(FixMeshSurface*, int, double*, double*, int, double*);
   static const auto original = own<Call::mesh_contact, Original>();
+  if (solidcull::WholeBedForces::at_work()) return;
   solidcull::MeshLoads::contact(this, ip, frc, delta, iTri);
   original(this, ip, frc, delta, iTri, v_wall);
 }

@@ -20,6 +20,7 @@
 #include "input.h"
 #include "lammps.h"
 #include "modify.h"
+#include "program_calls.h"
 #include "variable.h"
 
 namespace decks {
@@ -84,9 +85,13 @@ Engine::Engine() {
   std::vector<char*> args;
   for (std::string& w : words) args.push_back(&w[0]);
   lmp_ = new LAMMPS_NS::LAMMPS(static_cast<int>(args.size()), args.data(), MPI_COMM_WORLD);
+  in_deck_ = std::make_unique<solidcull::ProgramCall>(lmp_, solidcull::ProgramCall::By::library);
 }
 
-Engine::~Engine() { delete lmp_; }
+Engine::~Engine() {
+  in_deck_.reset();
+  delete lmp_;
+}
 
 void Engine::run(const std::string& deck) {
   std::istringstream lines(deck);

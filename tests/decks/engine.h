@@ -5,6 +5,7 @@
 
 #include <array>
 #include <map>
+#include <memory>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -13,6 +14,9 @@ namespace LAMMPS_NS {
 class Fix;
 class LAMMPS;
 }  // namespace LAMMPS_NS
+namespace solidcull {
+class ProgramCall;
+}
 
 namespace decks {
 
@@ -29,6 +33,7 @@ using State = std::map<int, Granule>;
 /// History of each contact (tag, partner) as `tag` sees it; mesh contacts have the negative triangle ID - 1 as partner.
 using Histories = std::map<std::pair<int, int>, std::vector<double>>;
 
+/// Tests look at the engine as a deck leaves it between two of its commands: culled granules are none of its atoms then.
 class Engine {
  public:
   Engine();
@@ -47,6 +52,7 @@ class Engine {
 
  private:
   LAMMPS_NS::LAMMPS* lmp_;
+  std::unique_ptr<solidcull::ProgramCall> in_deck_;
 };
 
 double largest_difference(const State& a, const State& b, Vec Granule::*what);

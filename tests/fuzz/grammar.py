@@ -2,6 +2,7 @@
 import random
 
 from decks import CullLine, Deck, Part
+from more import MoreEvents
 
 D = 0.003          # m: the largest diameter
 MOST = 400         # granules
@@ -19,13 +20,16 @@ def region_in(rng, box, low, high):
     return " ".join(sides)
 
 
-class Grammar:
-    """Makes one deck. Traits: `loose` once chance may change how many granules there are, `leaves` where granules may leave,
+class Grammar(MoreEvents):
+    """Makes one deck. `more`: with the events of more.py; `library`: whether it goes by the C library, None for one deck of five. Traits: `loose` once chance may change how many granules there are, `leaves` where granules may leave,
     `driven` where the end is not at rest."""
 
-    def __init__(self, seed, between="all", ranks=None):
+    def __init__(self, seed, between="all", ranks=None, more=True, library=None):
         self.rng = random.Random(f"solidcull {seed}")
         self.seed, self.between, self.ranks = seed, between, ranks
+        self.more = more and between == "all"
+        self.library = self.more and (self.chance(0.2) if library is None else library)
+        self.streaming = self.pair_changed = False
         self.traits, self.parts, self.files, self.names = set(), [], [], 0
         self.culling, self.checks, self.groups, self.exact_groups = False, 0, [], ["all"]
         self.meshes, self.inserting, self.held = [], None, []
@@ -62,6 +66,8 @@ class Grammar:
         self.poly = self.chance(0.5)
         self.model()
         self.head()
+        if self.library:
+            self.by_turns()
         self.physics()
         self.bed()
         self.events()
@@ -69,6 +75,8 @@ class Grammar:
             self.resume()
         self.end()
         self.files.append(self.parts)
+        if self.library:
+            self.traits.add("library")
         return Deck(self.seed, [r for r, _ in self.ranks_of], self.files, self.traits)
 
     def pick_ranks(self):
@@ -117,9 +125,9 @@ class Grammar:
             self.say(f"fix m8 all property/global cohesionEnergyDensity peratomtypepair 2 {four(5000)}", needed=True)
         self.say(f"pair_style gran model {self.contact}", "pair_coeff * *", f"timestep {self.dt}", needed=True)
         self.say(f"fix grav all gravity 9.81 vector {self.gravity}")
-        self.walls()
+        self.walls(again)
 
-    def walls(self):
+    def walls(self, again):
         wall = f"wall/gran model {self.contact}"
         for axis, reach in (("x", self.box), ("y", self.box)):
             if not self.periodic["xy".index(axis)]:
@@ -143,6 +151,8 @@ class Grammar:
             self.meshes.append("tool")
         if self.meshes:
             self.say(f"fix meshes all {wall} mesh n_meshes {len(self.meshes)} meshes {' '.join(self.meshes)}", needed=True)
+        if self.more:
+            self.local_contacts(again)
 
     def tool_height(self):
         return (self.layers + 2) * D
@@ -250,9 +260,20 @@ class Grammar:
             if self.between != "none":
                 for _ in range(self.rng.randint(0, 4)):
                     self.event()
+                    if self.more and self.chance(0.3):
+                        self.another_event()
             self.run()
+            self.ask_the_library()
+
+    def ask_the_library(self):
+        if self.library:
+            for _ in range(self.rng.randint(0, 3)):
+                self.by_turns()
+                self.library_call()
 
     def run(self):
+        if self.library:
+            self.by_turns()
         steps = self.rng.choice((20, 50, 100, 150) if self.slow else (50, 100, 200, 400, 800))
         how = self.rng.random()
         if how < 0.1:
@@ -448,6 +469,8 @@ class Grammar:
         words = self.rng.choice(("change_box all z final -0.0001 0.07 units box", "delete_atoms overlap 0.0005 all all compress no",
                                  "delete_atoms porosity fill 0.05 49979687 compress no", "reset_timestep 0",
                                  "minimize 1e-6 1e-6 10 10" if self.chance(0.2) else "reset_timestep 1000"))
+        if self.streaming and "reset" in words or "fill" in words and self.how != "lattice":
+            return
         self.say(words)
         if "delete" in words:
             self.traits |= {"loose", "driven"}
@@ -482,6 +505,8 @@ class Grammar:
         self.head("stop.restart")
         self.physics(again=True)
         self.say("fix integrate all nve/sphere", needed=True)
+        if self.more:
+            self.say("compute ke all ke", needed=True)
         self.say("thermo_modify lost error norm no")
         if self.culling:
             self.cull()
@@ -492,6 +517,7 @@ class Grammar:
             if self.between != "none":
                 self.event()
             self.run()
+            self.ask_the_library()
 
     def end(self):
         if self.culling and self.chance(0.85):
@@ -504,7 +530,7 @@ class Grammar:
             self.say("variable w equal f_floor[3]", 'print "WEIGHT ${w}"')
 
 
-def meshes(deck_box, room, height):
+def meshes(deck_box, room, height, layers):
     """STL files that decks name: text by file name."""
     def stl(triangles):
         rows = ["solid mesh"]
@@ -519,13 +545,15 @@ def meshes(deck_box, room, height):
 
     b, out = deck_box, 0.0002
     return {"floor.stl": stl(grid((-out, -out, 0), (room + 2 * out, 0, 0), (0, b + 2 * out, 0), 3)),
+            "high.stl": stl(grid((0.2 * b, 0.2 * b, height + 3 * D), (0.6 * b, 0, 0), (0, 0.6 * b, 0), 1)),
+            "low.stl": stl(grid((0.2 * b, 0.2 * b, 0.3 * layers * D), (0.6 * b, 0, 0), (0, 0.6 * b, 0), 1)),
             "plate.stl": stl(grid((0.2 * b, 0.2 * b, height), (0.6 * b, 0, 0), (0, 0.6 * b, 0), 2)),
             "blade.stl": stl(grid((0.5 * b, 0.2 * b, height - 2 * D), (0, 0.6 * b, 0), (0, 0, 2 * D), 2))}
 
 
-def make(seed, between="all", ranks=None):
+def make(seed, between="all", ranks=None, more=True, library=None):
     """The deck of a seed, and the meshes that it needs."""
-    g = Grammar(seed, between, ranks)
+    g = Grammar(seed, between, ranks, more, library)
     deck = g.deck()
-    deck.meshes = meshes(g.box, g.room, g.tool_height())
+    deck.meshes = meshes(g.box, g.room, g.tool_height(), g.layers)
     return deck

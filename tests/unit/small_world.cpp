@@ -388,6 +388,11 @@ void SmallAtoms::publish_counts(std::int64_t returned) {
   returned_last = returned;
 }
 
+void SmallAtoms::count_more(std::int64_t returned) {
+  published += returned;
+  returned_last = returned;
+}
+
 // ------------------------------------------------------------------------------------------------------------ contacts
 
 void SmallContacts::build() {

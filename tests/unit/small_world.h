@@ -116,6 +116,7 @@ class SmallAtoms : public Atoms {
   std::string layout_text(int layout) const override { return texts_.at(static_cast<std::size_t>(layout)); }
   int layout_from_text(const std::string& text) override;
   void publish_counts(std::int64_t returned) override;
+  void count_more(std::int64_t returned) override;
   void sort_soon() override { sort_asked = true; }
 
   int find(int tag) const;  ///< owned; -1: none

@@ -7,13 +7,15 @@ from .errors import RunError
 from .logs import FROM_HERE, THERMO_WORDS, TO_HERE, reducer_of
 
 SAMPLE_EVERY = 10  # steps between two rows of COUNTS
-SHIFT = 1e-5       # granule diameters, between two unculled runs
 SEEDS = (15485863, 15485867, 32452843, 32452867, 49979687, 49979693, 67867967, 67867979, 86028121, 86028157)
+ENDS_BEFORE = "twin: compared up to line "
+SETTING_UP = {"fix", "fix_modify", "compute", "compute_modify", "thermo", "thermo_style", "thermo_modify", "dump", "dump_modify", "region",
+              "variable", "timestep", "neighbor", "neigh_modify", "restart"}  # commands that ask for no granule
 CULL_LINE = re.compile(r"^(fix\s+\S+\s+\S+\s+solid/cull.*)$", re.M)
 
 
 def read_deck(path):
-    """Logical lines of a deck (`&` joined); a file that it includes is put in place when it holds the fix line or thermo columns."""
+    """Logical lines of a deck (`&` joined); a file that it includes is put in place when it holds the fix line, thermo columns or a run."""
     try:
         text = Path(path).read_text()
     except OSError as e:
@@ -22,7 +24,7 @@ def read_deck(path):
     for line in re.sub(r"&[ \t]*\n", " ", text).splitlines():
         included = re.match(r"\s*include\s+(\S+)", line)
         file = Path(path).parent / included[1] if included else None
-        if file and file.is_file() and re.search("solid/cull|thermo_style", file.read_text()):
+        if file and file.is_file() and re.search(r"solid/cull|thermo_style|^\s*run\s", file.read_text(), re.M):
             lines += read_deck(file)
         else:
             lines.append(line)
@@ -76,7 +78,7 @@ class Dependents:
                 return True
             if kind == "variable" and (f"${{{name}}}" in word or len(name) == 1 and f"${name}" in word):
                 return True
-            if kind in ("region", "group") and word == name:
+            if kind in ("region", "group") and (word == name or re.search(rf"(?<=[(,]){n}(?=[,)])", word)):
                 return True
         return False
 
@@ -101,32 +103,43 @@ def end_of_deck(final):
     return [f'write_dump all custom "{final}" id mass radius x y z modify format "%d %.15g %.15g %.15g %.15g %.15g"']
 
 
-def make_deck(lines, fix_id, culled, shift_seed, base):
-    """The deck of one run, as lines. `base`: path without suffix for what this run writes."""
+def make_deck(lines, fix_id, culled, shift, base, restored=False):
+    """The deck of one run, as lines. `shift`: a shifts.Shift, or None. `base`: path without suffix for what this run writes. `restored`:
+    the deck begins with a file that holds culled granules, so every run takes them up with the fix line, an unculled one then ends it."""
     hangs = Dependents(fix_id)
-    ended, counting, shifted, out = set(), False, False, []
+    ended, counting, waiting, ran, out = set(), False, False, False, []
     for number, line in enumerate(lines, 1):
         w = words_of(line)
         if w[:1] == ["fix"] and w[3:4] == ["solid/cull"]:
-            out += [f'print "{FROM_HERE}"'] + ([line, counts_line(fix_id, base)] if culled else [f"# {line}"])
-            counting = True
+            out += [f'print "{FROM_HERE}"', line if culled or restored else f"# {line}"]
+            out += [counts_line(fix_id, base)] * culled + (shift.begin() if shift else [])
+            counting, waiting = True, restored
             continue
-        if w[:1] == ["run"] and counting and not shifted:
-            out += shift_lines(shift_seed)
-            shifted = True
-        if not w or not hangs.touches(w):
+        if waiting and w and w[0] not in SETTING_UP:
+            out += ["run 0"] + [f"unfix {fix_id}"] * (not culled)
+            waiting = False
+        hanging = bool(w) and hangs.touches(w)
+        if w[:1] == ["run"] and counting and not hanging:
+            out += shift.before(w, line) if shift else [line]
+            ran = True
+            continue
+        if not hanging:
             out.append(line)
             continue
+        kept_out = w[0] in ("thermo_style", "print") or w[0] in hangs.MAKERS or w[0] in hangs.ENDERS
+        if not kept_out and not ran:
+            raise RunError(f"line {number} hangs on the solid/cull fix and cannot be left out: {' '.join(w)}")
+        if not kept_out:
+            out.append(f'print "{ENDS_BEFORE}{number}"')
+            break
         if w[0] in ("unfix", "uncompute", "undump"):
             ended.add((hangs.ENDERS[w[0]], w[1]))
         if culled:
             out += ["unfix twin_counts"] * (w[:2] == ["unfix", fix_id]) + [line]
         elif w[0] == "thermo_style" or w[0] == "dump" and w[3:4] == ["custom"]:
             out.append(" ".join(x for x in w if not hangs.names(x)))
-        elif w[0] in hangs.MAKERS or w[0] in hangs.ENDERS or w[0] == "print":
-            out.append(f"# {line}")
         else:
-            raise RunError(f"line {number} hangs on the solid/cull fix and cannot be left out: {' '.join(w)}")
+            out.append(f"# {line}")
     out.append(f'print "{TO_HERE}"')
     if ("fix", fix_id) not in ended:
         out.append("thermo_style one")
@@ -134,6 +147,42 @@ def make_deck(lines, fix_id, culled, shift_seed, base):
             out += ["unfix twin_counts"] + hangs.undo(ended) + [f"unfix {fix_id}"]
         out.append("run 0")
     return out + end_of_deck(f"{base}.final")
+
+
+def ends_before(lines):
+    """The first line of a deck of make_deck's that hangs on the fix and has no meaning without it: its number, or None."""
+    found = [re.match(f'print "{ENDS_BEFORE}(\\d+)"', line) for line in lines]
+    return next((int(m[1]) for m in found if m), None)
+
+
+def value_of(word, lines, variables):
+    """A word of a deck with the values of its variables put in; None where LIGGGHTS alone can tell."""
+    known = {w[1]: w[3] for w in map(words_of, lines) if w[:1] == ["variable"] and w[2:3] in (["index"], ["string"]) and len(w) > 3} | variables
+    made = re.sub(r"\$\{(\w+)\}|\$(\w)", lambda m: str(known.get(m[1] or m[2], m[0])), word)
+    return None if re.search(r"[$*%]", made) else made
+
+
+def restart_of(lines, fix_id, variables):
+    """The file that the deck reads before its fix line, or None."""
+    for w in map(words_of, lines):
+        if w[:1] == ["read_restart"] and len(w) > 1:
+            return value_of(w[1], lines, variables)
+        if w[:2] == ["fix", fix_id]:
+            break
+    return None
+
+
+def check_vary(name, values, runs, lines):
+    """Refuses a variable that takes no value from outside, or has too few of them."""
+    if len(values) < runs:
+        raise RunError(f"--vary {name} has {len(values)} values for {runs} runs")
+    made = next((w for w in map(words_of, lines) if w[:2] == ["variable", name]), None)
+    if made and made[2:3] != ["index"]:
+        raise RunError(f"--vary {name}: only a variable of style index takes a value from outside; write `variable {name} index ...` "
+                       f"in place of `{' '.join(made)}`")
+    uses = rf"\$\{{{name}\}}|\bv_{name}\b" + (rf"|\${name}" if len(name) == 1 else "")
+    if not any(re.search(uses, line) or words_of(line)[:1] in (["include"], ["jump"]) for line in lines):
+        raise RunError(f"--vary {name}: the deck does not use it; write ${{{name}}} where the value is to stand")
 
 
 def check_metrics(metrics, lines):
@@ -154,14 +203,3 @@ def check_metrics(metrics, lines):
 def counts_line(fix_id, base):
     columns = " ".join(f"f_{fix_id}[{k}]" for k in range(1, len(COUNTS) + 1))
     return f'fix twin_counts all ave/time {SAMPLE_EVERY} 1 {SAMPLE_EVERY} {columns} file "{base}.counts"'
-
-
-def shift_lines(seed):
-    """Moves every granule by up to SHIFT of its diameter; nothing without a seed."""
-    if not seed:
-        return []
-    lines = []
-    for k, axis in enumerate("xyz"):
-        lines += [f"variable twin_{axis} atom {axis}+{2 * SHIFT:g}*r*random(-1,1,{seed + k})",
-                  f"set group all {axis} v_twin_{axis}"]
-    return lines

@@ -42,7 +42,7 @@ class CaseJob(KeptJob):
         self.case, self.scene, self.point, self.k, self.frames = case, scene, point, k, frames
         kind = "unculled" if point.family in (UNCULLED, BY_HAND) else "culled"
         name = re.sub(r"[^\w.]+", "-", f"{scene} {point.name} {k + 1}".strip())
-        super().__init__(case.deck, out, kind, 0, variables, extra=self.measured, launcher=launcher,
+        super().__init__(case.deck, out, kind, 0, variables, shifted=False, extra=self.measured, launcher=launcher,
                          keywords=point.keywords or None, name=name, made_with=made_with)
 
     def measured(self, run):

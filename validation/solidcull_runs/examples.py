@@ -61,7 +61,7 @@ class Example:
         keywords = f"{few and self.few_keywords or ''} bed {every} {at}/bed.*.vtp mesh {every} {at}/mesh.*.vtp"
         if self.vdb_every:
             keywords += f" mesh {every if few else self.vdb_every} {at}/mesh.*.vdb"
-        return Job(self.here / self.deck, out, "files", 0, variables, keywords=keywords, name="files")
+        return Job(self.here / self.deck, out, "files", 0, variables, shifted=False, keywords=keywords, name="files")
 
 
 def load(name):

@@ -34,7 +34,7 @@ def table(result):
         names = outside(result)
         lines.append(f"OUTSIDE its margin: {', '.join(names)}" if names else "all metrics within their margins")
     if result["no_scatter"]:
-        lines.append("the unculled runs are all alike: no granules were there to be moved apart; name a variable with --vary")
+        lines.append("the unculled runs are all alike: no granules were moved apart, or it made no difference; name a variable with --vary")
     return "\n".join(lines)
 
 

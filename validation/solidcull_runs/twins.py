@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import decks, dumps, logs, metrics
+from . import decks, dumps, logs, metrics, restarts, shifts
 from .engine import POLL, Process, find_launcher
 from .errors import RunError
 
@@ -66,7 +66,7 @@ class Job:
         self.kind, self.name, self.keywords = kind, name or f"{kind}-{k + 1}", keywords
         self.deck, self.base = Path(deck).resolve(), Path(out).resolve() / self.name
         self.variables, self.ranks = {**(variables or {}), "twin": self.name}, ranks
-        self.seed = decks.SEEDS[k - 1] if k and shifted else None
+        self.seed, self.shifted = decks.SEEDS[k - 1] if k and shifted else None, shifted
         self.wanted, self.extra, self.launcher = wanted, extra, launcher
 
     def file(self, suffix):
@@ -75,7 +75,11 @@ class Job:
     def text(self):
         """The deck of this run."""
         lines = decks.read_deck(self.deck)
-        made = "\n".join(decks.make_deck(lines, decks.cull_fix(lines, self.deck.name), self.kind != "unculled", self.seed, self.base)) + "\n"
+        fix = decks.cull_fix(lines, self.deck.name)
+        restart = decks.restart_of(lines, fix, self.variables)
+        restored = restart is not None and restarts.holds_culled(self.deck.parent / restart)
+        shift = shifts.Shift(self.seed, lines) if self.shifted else None
+        made = "\n".join(decks.make_deck(lines, fix, self.kind != "unculled", shift, self.base, restored)) + "\n"
         return decks.with_keywords(made, self.keywords) if self.keywords and self.kind != "unculled" else made
 
     def kept(self):
@@ -210,11 +214,14 @@ def compare(deck, wanted=(), launcher=None, out=None, unculled=3, culled=1, vary
     that are run behind these. `result` is plain data (see twin.json)."""
     deck = Path(deck).resolve()
     lines = decks.read_deck(deck)
-    decks.check_metrics(wanted, decks.make_deck(lines, decks.cull_fix(lines, deck.name), False, None, "-"))
+    unculled_deck = decks.make_deck(lines, decks.cull_fix(lines, deck.name), False, None, "-")
+    decks.check_metrics(wanted, unculled_deck)
     launcher = find_launcher(launcher)
     out = Path(out) if out else deck.with_name(deck.name + ".twin")
-    if vary and len(vary[1]) < max(unculled, culled):
-        raise RunError(f"--vary {vary[0]} has {len(vary[1])} values for {max(unculled, culled)} runs")
+    if vary:
+        decks.check_vary(*vary, max(unculled, culled), lines)
+    if (last := decks.ends_before(unculled_deck)):
+        say(f"compared up to line {last}, which has no meaning without the solid/cull fix")
     jobs = [Job(deck, out, kind, k, {**(variables or {}), **({vary[0]: vary[1][k]} if vary else {})}, ranks, not vary, wanted, extra, launcher,
                 keywords)
             for kind, k in in_turns(unculled, culled)]
