@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 #include <mpi.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <ostream>
@@ -32,7 +34,7 @@ const Style styles[] = {
     {"pack_once",
      TEMPLATE("0.0008") FROM("pack") "insert_every once overlapcheck yes all_in yes region where particles_in_region 400\n"},
     {"pack_often",
-     TEMPLATE("0.0008") FROM("pack") "insert_every 200 overlapcheck yes all_in no region where particles_in_region 400\n"},
+     TEMPLATE("0.0008") FROM("pack") "insert_every 40 overlapcheck yes all_in no region where particles_in_region 400\n"},
     {"pack_no_check",
      TEMPLATE("0.0008") FROM("pack") "insert_every once overlapcheck no all_in yes region where particles_in_region 260\n"},
     {"pack_large",
@@ -97,7 +99,8 @@ struct Outcome {
   double granules, energy;
 };
 
-Outcome outcome(Engine& e, const Style& style, const Place& place, const std::string& culling) {
+/// moved_by: what the bed is moved by before the insertion (m).
+Outcome outcome(Engine& e, const Style& style, const Place& place, const std::string& culling, double moved_by = 0) {
   const std::string face = std::string("face_") + place.name + ".stl";
   const std::string start = read_bed(bed()) + "variable n equal count(all)\nvariable k equal ke\n" + culling;
   if (e.rank() == 0) {
@@ -107,6 +110,11 @@ Outcome outcome(Engine& e, const Style& style, const Place& place, const std::st
   MPI_Barrier(MPI_COMM_WORLD);
   e.run(start + "run 200\n");
   e.run("variable now equal step\n");
+  if (moved_by != 0) {
+    std::ostringstream moved;
+    moved << "displace_atoms all move " << moved_by << " 0 0 units box\n";
+    e.run(moved.str());
+  }
   std::ostringstream block, later;
   block << "region where block 0.004 0.022 0.004 0.022 " << place.lo << ' ' << place.lo + 0.01 << " units box\n";
   later << static_cast<long>(e.variable("now")) + 150;
@@ -120,15 +128,25 @@ Outcome outcome(Engine& e, const Style& style, const Place& place, const std::st
 
 TEST_P(Insertion, BringsAsManyGranulesAsWithoutCulling) {
   const auto& [style, place] = GetParam();
-  Engine stock, culled;
-  const Outcome expected = outcome(stock, style, place, "");
+  Engine culled;
+  // who is at the edge of a block when granules come the next time is a matter of chance: so are counts then
+  double least = HUGE_VAL, most = 0, least_energy = HUGE_VAL, most_energy = 0;
+  for (const double moved_by : {0.0, 1e-8, -1e-8, 2e-8, -2e-8}) {
+    Engine stock;
+    const Outcome o = outcome(stock, style, place, "", moved_by);
+    if (stock.rank() == 0) std::printf("%s %s: stock %g, %g J\n", style.name, place.name, o.granules - 1300, o.energy);
+    least = std::min(least, o.granules);
+    most = std::max(most, o.granules);
+    least_energy = std::min(least_energy, o.energy);
+    most_energy = std::max(most_energy, o.energy);
+  }
   const Outcome found = outcome(culled, style, place, "fix cull all solid/cull exterior sleep every 50 calm 2\n");
   EXPECT_GT(culled.vector("cull", 6), 600) << "the bed never slept";
-  EXPECT_EQ(found.granules, expected.granules);
-  EXPECT_NEAR(found.energy, expected.energy, 0.05 * expected.energy + 1e-8);
-  if (culled.rank() == 0)
-    std::printf("%s %s: %g granules, %g J; culled %g, %g J\n", style.name, place.name, expected.granules - 1300, expected.energy,
-                found.granules - 1300, found.energy);
+  if (culled.rank() == 0) std::printf("%s %s: culled %g, %g J\n", style.name, place.name, found.granules - 1300, found.energy);
+  EXPECT_GE(found.granules, least);
+  EXPECT_LE(found.granules, most);
+  EXPECT_GE(found.energy, 0.95 * least_energy - 1e-8);
+  EXPECT_LE(found.energy, 1.05 * most_energy + 1e-8);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Insertion, testing::Combine(testing::ValuesIn(styles), testing::ValuesIn(places)),
