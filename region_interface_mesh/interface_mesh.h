@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,11 +20,10 @@ struct TriangleMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-/// A persistent level set around the granules of a solid body, negative inside, closed over the pores between granules.
-/// Additions and carvings are queued and done when a question is asked, so a run that never asks pays nothing (but for a queue of
-/// four million spheres at most). The mesh depends on the order of these calls, never on when a question came between them.
-/// The mesh stands in the frame of its body: what is added and carved is given in that frame, what is asked in the world's,
-/// through the pose (the identity until set_pose). Lengths in m. Every member is local to the calling rank. Not thread-safe.
+/// A level set around the granules of a solid body, negative inside, closed over the pores between granules. It is kept: where
+/// granules come and go it is made anew, and nowhere else, and is then what it would be if it were made at once.
+/// The mesh stands in the frame of its body: granules are given in that frame, what is asked in the world's, through the pose
+/// (the identity until set_pose). Lengths in m. Every member is local to the calling rank. Not thread-safe.
 class InterfaceMesh {
  public:
   /// voxel: edge of a voxel (> 0). closing: pores into which a ball of this radius does not fit are filled (>= 0).
@@ -35,22 +35,31 @@ class InterfaceMesh {
   InterfaceMesh(const InterfaceMesh&) = delete;
   InterfaceMesh& operator=(const InterfaceMesh&) = delete;
 
-  /// CSG union with the closed union of these granules (frame of the body). Pores between new granules and `context` (granules
-  /// that are in the body already, near the new ones) are closed too; of the context only what lies within r + 2 closing of a new
-  /// granule is added again: nothing farther away changes. Throws std::invalid_argument for what is no sphere. No sphere is
-  /// dropped for being small against the voxel: below 0.9 voxels it is held with a radius of 0.9 voxels.
-  void add(const std::vector<Sphere>& granules, const std::vector<Sphere>& context = {});
+  // --- upkeep (frame of the body)
+  /// Calls visit with every granule of the body whose centre is in the box; with others, too, if it likes.
+  using Gather = std::function<void(const Vec3& lo, const Vec3& hi, const std::function<void(const Sphere&)>& visit)>;
+
+  /// A granule of the body came or went here. Throws std::invalid_argument for what is no sphere. At first all is to be made.
+  void touch(const Sphere& granule);
+  /// Makes anew what was touched. largest_radius: no granule of the body has a larger one. No sphere is dropped for being small
+  /// against the voxel: below 0.9 voxels it is held with a radius of 0.9 voxels.
+  void update(const Gather& granules, double largest_radius);
+  /// After update(): these granules are not in the body and lie outside its surface, though pores around them be closed. Where
+  /// they overlap with granules of the body, those go first. Those that were left out before, and are not given, are not any
+  /// more.
+  void leave_out(std::vector<Sphere> exterior, const Gather& granules, double largest_radius);
 
   /// Where the body is now. Costs nothing: the mesh rides along.
   void set_pose(const Pose& pose);
   const Pose& pose() const;
 
-  /// CSG difference with a ball (frame of the body): what the carve law takes away.
-  void carve(const Sphere& ball);
-
-  /// CSG union with the other body's surface (bodies that merged), where it is now: one that stands in another frame is
-  /// resampled. The other one is left empty and may be used again. Throws std::invalid_argument if its voxel differs.
+  /// CSG union with the other body's surface, where it is now: one that stands in another frame is resampled. The other one is
+  /// left empty. The next update() makes all of this one anew. Throws std::invalid_argument if its voxel differs.
   void merge(InterfaceMesh&& other);
+
+  /// Corners, in the frame of the body, of an axis-aligned box around all that an update() may change where nothing was touched;
+  /// false if there is nothing.
+  bool grid_box(Vec3& lo, Vec3& hi) const;
 
   bool empty() const;                ///< nothing inside
   bool inside(const Vec3& p) const;  ///< level set negative at p; world frame, as all questions

@@ -1,5 +1,7 @@
 #include "mesh_files.h"
 
+#include <unistd.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cerrno>
@@ -13,6 +15,12 @@
 namespace solidcull {
 
 static_assert(sizeof(float) == 4 && sizeof(int) == 4, "the files hold 32-bit numbers");
+
+void check_folder_of(const std::string& file) {
+  const std::size_t slash = file.rfind('/');
+  const std::string folder = slash == std::string::npos ? "." : file.substr(0, slash + 1);
+  if (::access(folder.c_str(), W_OK) != 0) throw std::runtime_error("cannot write " + file + ": " + std::strerror(errno));
+}
 
 // --- WholeFile --------------------------------------------------------------------------------------------------
 

@@ -8,6 +8,9 @@
 
 namespace solidcull {
 
+/// Throws std::runtime_error, as the writers would, where the folder of the file is missing or may not be written to. Local.
+void check_folder_of(const std::string& file);
+
 /// Binary STL; throws std::runtime_error naming the file and the reason if it cannot be written. Local.
 void write_stl(const std::string& file, const TriangleMesh& mesh);
 

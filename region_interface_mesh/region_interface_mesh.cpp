@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "comm.h"
+#include "domain.h"
 #include "error.h"
 #include "fix.h"
 #include "interface_mesh_source.h"
@@ -17,6 +18,13 @@ RegInterfaceMesh::RegInterfaceMesh(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
   if (narg < 3) error->all(FLERR, "region interface/mesh: give the ID of a fix solid/cull");
   fix_ = arg[2];
   options(narg - 3, &arg[3]);
+  if (dynamic_check())
+    error->all(FLERR,
+               "region interface/mesh: it moves with its bodies, and the keywords move and rotate would do nothing: leave "
+               "them out");
+  // LIGGGHTS would take a box once and for all, and the region follows its bodies
+  bboxflag = 0;
+  extent_xlo = extent_ylo = extent_zlo = extent_xhi = extent_yhi = extent_zhi = 0;
   varshape = 1;
   cmax = 1;
   contact = new Contact[cmax];
@@ -43,49 +51,48 @@ void RegInterfaceMesh::shape_update() {
   if (!source) refuse();
   meshes_ = &source->interface_meshes();
   source_ = source->source();
-  Vec3 lo = Vec3::Constant(HUGE_VAL), hi = Vec3::Constant(-HUGE_VAL);
-  for (const auto& mesh : *meshes_) {
-    if (mesh.second.empty()) continue;
-    Vec3 a, b;
-    mesh.second.bounds(a, b);
-    lo = lo.cwiseMin(a);
-    hi = hi.cwiseMax(b);
+  reach_.clear();
+  for (const auto& [body, mesh] : *meshes_) {
+    if (mesh.empty()) continue;
+    Reach r{&mesh, Vec3::Zero(), Vec3::Zero()};
+    mesh.bounds(r.lo, r.hi);
+    r.lo -= Vec3::Constant(mesh.half_width());
+    r.hi += Vec3::Constant(mesh.half_width());
+    reach_.push_back(r);
   }
-  // the box is this rank's; an empty region has an empty box
-  bboxflag = interior;
-  if ((lo.array() > hi.array()).any()) lo = hi = Vec3::Zero();
-  extent_xlo = lo[0];
-  extent_ylo = lo[1];
-  extent_zlo = lo[2];
-  extent_xhi = hi[0];
-  extent_yhi = hi[1];
-  extent_zhi = hi[2];
 }
 
-double RegInterfaceMesh::distance(const Vec3& p, const InterfaceMesh*& nearest) {
+/// Bodies hang together through periodic sides: the place counts in all of its images.
+double RegInterfaceMesh::distance(const Vec3& p, const InterfaceMesh*& nearest, Vec3& image) {
   if (source_.expired()) shape_update();  // the engine asks for that once in a time step only, and fixes go between runs
   double least = HUGE_VAL;
   nearest = nullptr;
-  for (const auto& mesh : *meshes_) {
-    if (mesh.second.empty()) continue;
-    const double d = mesh.second.signed_distance(p);
-    if (d < least) {
-      least = d;
-      nearest = &mesh.second;
-    }
-  }
+  const int* const periodic = domain->periodicity;
+  for (const Reach& r : reach_)
+    for (int i = -periodic[0]; i <= periodic[0]; ++i)
+      for (int j = -periodic[1]; j <= periodic[1]; ++j)
+        for (int k = -periodic[2]; k <= periodic[2]; ++k) {
+          const Vec3 x = p + Vec3(i * domain->xprd, j * domain->yprd, k * domain->zprd);
+          if ((x.array() < r.lo.array()).any() || (x.array() > r.hi.array()).any()) continue;
+          const double d = r.mesh->signed_distance(x);
+          if (d >= least) continue;
+          least = d;
+          nearest = r.mesh;
+          image = x;
+        }
   return least;
 }
 
 int RegInterfaceMesh::inside(double x, double y, double z) {
   const InterfaceMesh* body = nullptr;
-  return distance(Vec3(x, y, z), body) < 0;
+  Vec3 image;
+  return distance(Vec3(x, y, z), body, image) < 0;
 }
 
-int RegInterfaceMesh::contact_with(double* x, double distance, double cutoff, const InterfaceMesh* body) {
+int RegInterfaceMesh::contact_with(double distance, double cutoff, const InterfaceMesh* body, const Vec3& image) {
   // beyond the narrow band the distance is not known, only that it is larger
   if (!body || distance >= cutoff || distance >= body->half_width()) return 0;
-  const Vec3 away = body->normal(Vec3(x[0], x[1], x[2]));
+  const Vec3 away = body->normal(image);
   const double side = interior ? -1 : 1;
   contact[0].r = distance;
   contact[0].delx = side * distance * away[0];
@@ -96,14 +103,16 @@ int RegInterfaceMesh::contact_with(double* x, double distance, double cutoff, co
 
 int RegInterfaceMesh::surface_interior(double* x, double cutoff) {
   const InterfaceMesh* body = nullptr;
-  const double d = distance(Vec3(x[0], x[1], x[2]), body);
-  return d < 0 ? contact_with(x, -d, cutoff, body) : 0;
+  Vec3 image;
+  const double d = distance(Vec3(x[0], x[1], x[2]), body, image);
+  return d < 0 ? contact_with(-d, cutoff, body, image) : 0;
 }
 
 int RegInterfaceMesh::surface_exterior(double* x, double cutoff) {
   const InterfaceMesh* body = nullptr;
-  const double d = distance(Vec3(x[0], x[1], x[2]), body);
-  return body && d > 0 ? contact_with(x, d, cutoff, body) : 0;
+  Vec3 image;
+  const double d = distance(Vec3(x[0], x[1], x[2]), body, image);
+  return body && d > 0 ? contact_with(d, cutoff, body, image) : 0;
 }
 
 }  // namespace solidcull

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "interface_mesh.h"
 #include "region.h"
@@ -21,9 +22,15 @@ class RegInterfaceMesh : public LAMMPS_NS::Region {
   void shape_update() override;
 
  private:
-  /// Level set of the nearest body at p and that body (nullptr if there is none).
-  double distance(const Vec3& p, const InterfaceMesh*& nearest);
-  int contact_with(double* x, double distance, double cutoff, const InterfaceMesh* body);
+  /// A body's mesh, and the box in which its level set is less than it is far away.
+  struct Reach {
+    const InterfaceMesh* mesh;
+    Vec3 lo, hi;
+  };
+
+  /// Level set of the nearest body at p, that body (nullptr if there is none near), and the periodic image of p at which it is.
+  double distance(const Vec3& p, const InterfaceMesh*& nearest, Vec3& image);
+  int contact_with(double distance, double cutoff, const InterfaceMesh* body, const Vec3& image);
 
   [[noreturn]] void refuse() const;
 
@@ -31,6 +38,7 @@ class RegInterfaceMesh : public LAMMPS_NS::Region {
   bool made_ = false;  // the command is done
   std::weak_ptr<const void> source_;
   const std::map<int, InterfaceMesh>* meshes_ = nullptr;
+  std::vector<Reach> reach_;
 };
 
 }  // namespace solidcull

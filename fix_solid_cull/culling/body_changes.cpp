@@ -2,13 +2,15 @@
 
 namespace solidcull {
 
-void split_bodies(Solid& solid, Shell& shell, const AtomIndex& index, const GranuleMasses& masses) {
+void split_bodies(const Atoms& atoms, Solid& solid, Shell& shell, const AtomIndex& index, const GranuleMasses& masses) {
   solid.split(masses.by_tag(), [&](std::int64_t tag, int body, const Vec3& place) {
-    shell.stands(index.at(tag), {body, place});
+    const int i = index.at(tag);
+    solid.stands(shell[i].body, {shell[i].place, atoms.radius[i]});
+    shell.stands(i, {body, place});
   });
 }
 
-std::vector<Solid::Merge> adopt_places(const Atoms& atoms, Solid& solid, Shell& shell, Arrivals& arrivals) {
+void adopt_places(const Atoms& atoms, Solid& solid, Shell& shell, Arrivals& arrivals) {
   const SolidBodies& bodies = solid.bodies();
   for (int i = 0; i < atoms.owned; ++i) {
     if (!shell[i].locked || shell[i].body == Locked::arriving) continue;
@@ -20,17 +22,19 @@ std::vector<Solid::Merge> adopt_places(const Atoms& atoms, Solid& solid, Shell& 
       solid.turn_contacts(atoms.tag[i], to.turn().transpose() * from.turn());
     }
     shell.set_body(i, body);
+    solid.stands(body, {shell[i].place, atoms.radius[i]});
   }
   Arrivals moved;
   arrivals.for_each([&](std::int64_t tag, Arrival a) {
     const int body = bodies.body_of(tag);
     const Pose &from = bodies.pose(a.at.body), &to = bodies.pose(body);
     if (from != to) a.at.position = to.to_frame(from.to_world(a.at.position));
+    if (a.at.body != body) solid.stands(body, {a.at.position, a.radius});
     a.at.body = body;
     moved[tag] = a;
   });
   arrivals = std::move(moved);
-  return solid.adopt_swallowed();
+  solid.adopt_swallowed();
 }
 
 void label_bodies(const Atoms& atoms, Shell& shell, const BodyGroups& groups) {

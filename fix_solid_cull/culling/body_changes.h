@@ -13,11 +13,11 @@
 namespace solidcull {
 
 /// Bodies whose granules were unlocked become several where they came apart; interface granules follow. Local.
-void split_bodies(Solid& solid, Shell& shell, const AtomIndex& index, const GranuleMasses& masses);
+void split_bodies(const Atoms& atoms, Solid& solid, Shell& shell, const AtomIndex& index, const GranuleMasses& masses);
 
 /// Granules of swallowed bodies move to the frames of the bodies that they are part of now: interface granules, those that are to
-/// arrive, interior ones. Returns the merges since the last time. Local.
-std::vector<Solid::Merge> adopt_places(const Atoms& atoms, Solid& solid, Shell& shell, Arrivals& arrivals);
+/// arrive, interior ones. Local.
+void adopt_places(const Atoms& atoms, Solid& solid, Shell& shell, Arrivals& arrivals);
 
 /// Each atom is labelled with its body's number over all ranks. Local.
 void label_bodies(const Atoms& atoms, Shell& shell, const BodyGroups& groups);

@@ -6,89 +6,127 @@
 namespace solidcull {
 
 const std::map<int, InterfaceMesh>& BodyMeshes::ask() {
-  if (!follow_bodies()) {
-    wanted_ = true;
-    merges_.clear();
-    update({});
-  }
-  for (auto& mesh : meshes_) mesh.second.set_pose(solid_.bodies().pose(mesh.first));
+  if (held_) return meshes_;
+  wanted_ = true;
+  if (behind()) update();
+  for (auto& [body, mesh] : meshes_) mesh.set_pose(solid_.bodies().pose(body));
   return meshes_;
 }
 
-/// Bodies come and go without a change of membership when granules go to another rank or leave the box.
-bool BodyMeshes::follow_bodies() const {
-  return wanted_ && meshes_.size() == solid_.bodies().size() &&
+bool BodyMeshes::behind() const { return !held_ && (changed_ || up_to_date_at_ != ports_.run.step || !has_all()); }
+
+/// Each body has its mesh, and nothing else has.
+bool BodyMeshes::has_all() const {
+  return meshes_.size() == solid_.bodies().size() &&
          std::all_of(meshes_.begin(), meshes_.end(), [&](const auto& mesh) { return solid_.exists(mesh.first); });
 }
 
-void BodyMeshes::carve(int body, const Ball& ball) {
-  const auto mesh = meshes_.find(body);
-  if (mesh != meshes_.end()) mesh->second.carve({ball.centre, ball.radius});
+void BodyMeshes::hold() {
+  ask();
+  held_ = true;
 }
 
-void BodyMeshes::follow(const std::vector<int>& came_apart, const std::vector<std::int64_t>& locked_now) {
+/// Exterior granules may be others, too.
+void BodyMeshes::let_go() {
+  up_to_date_at_ = -1;
+  if (lost_track_) meshes_.clear();
+  held_ = lost_track_ = false;
+}
+
+void BodyMeshes::drop(int body) {
+  if (held_)
+    lost_track_ = true;
+  else
+    meshes_.erase(body);
+}
+
+void BodyMeshes::granule_changed(int body, const Sphere& granule) {
   if (!wanted_) return;
-  for (const int body : came_apart) meshes_.erase(body);
-  update(locked_now);
-}
-
-const Pose& BodyMeshes::pose_of_merged(int body) const {
-  for (const Solid::Merge& m : merges_)
-    if (m.swallowed == body) return m.pose;
-  return solid_.bodies().pose(body);
-}
-
-void BodyMeshes::unite_merged() {
-  for (const Solid::Merge& merge : merges_) {
-    const auto swallowed = meshes_.find(merge.swallowed);
-    if (swallowed == meshes_.end()) continue;
-    const auto kept = meshes_.find(merge.kept);
-    if (kept != meshes_.end()) {
-      // in a chain of merges the kept one may be swallowed by now
-      kept->second.set_pose(pose_of_merged(merge.kept));
-      swallowed->second.set_pose(merge.pose);
-      kept->second.merge(std::move(swallowed->second));
-    }
-    meshes_.erase(swallowed);
+  if (held_) {
+    lost_track_ = true;
+    return;
   }
-  merges_.clear();
+  changed_ = true;
+  const auto mesh = meshes_.find(body);
+  if (mesh != meshes_.end()) mesh->second.touch(granule);
 }
 
-void BodyMeshes::update(const std::vector<std::int64_t>& locked_now) {
-  unite_merged();
+void BodyMeshes::update() {
   for (auto mesh = meshes_.begin(); mesh != meshes_.end();)
     mesh = solid_.exists(mesh->first) ? std::next(mesh) : meshes_.erase(mesh);
+  for (const auto& body : solid_.bodies().bodies()) meshes_.try_emplace(body.first, scales_.voxel(), scales_.closing());
 
-  // granules of each body that its mesh does not have: all of a body without a mesh, else those locked just now
-  const SolidBodies& bodies = solid_.bodies();
-  std::map<int, std::vector<Sphere>> added;
-  const auto place = [&](std::int64_t tag) {
+  const Bodies shell = interface_granules();
+  SphereCells exterior;
+  exterior.build(exterior_granules(), 2 * scales_.diameter());
+  const GranuleStore& store = solid_.store();
+  for (auto& [body, mesh] : meshes_) {
+    mesh.set_pose(solid_.bodies().pose(body));
+    SphereCells interface;
+    const auto found = shell.find(body);
+    if (found != shell.end()) interface.build(found->second, 2 * scales_.diameter());
+    const InterfaceMesh::Gather members = [&, body = body](const Vec3& lo, const Vec3& hi, const auto& visit) {
+      store.for_each_in_box(store.frame_of(body), lo, hi, [&](const Resident& g) {
+        if (g.body == body) visit({g.position, g.radius});
+      });
+      interface.for_each_in_box(lo, hi, [&](std::size_t, const Sphere& s) {
+        visit(s);
+        return true;
+      });
+    };
+    const double largest = std::max(store.largest_radius(), interface.largest_radius());
+    mesh.update(members, largest);
+    mesh.leave_out(near(mesh, exterior), members, largest);
+  }
+  changed_ = false;
+  up_to_date_at_ = ports_.run.step;
+}
+
+/// By body, in its frame.
+BodyMeshes::Bodies BodyMeshes::interface_granules() const {
+  index_.index(ports_.atoms);
+  Bodies all;
+  solid_.bodies().for_each_member([&](std::int64_t tag, int body) {
     const GranuleMass g = masses_(tag);
-    return Sphere{g.position, g.radius};
-  };
-  const bool whole =
-      std::any_of(bodies.bodies().begin(), bodies.bodies().end(), [&](const auto& body) { return !meshes_.count(body.first); });
-  if (whole) {
-    std::vector<std::pair<std::int64_t, int>> members;
-    bodies.for_each_member([&](std::int64_t tag, int body) {
-      if (!meshes_.count(body)) members.emplace_back(tag, body);
-    });
-    solid_.store().for_each([&](const Resident& g) {
-      const int body = bodies.root(g.body);
-      if (!meshes_.count(body)) members.emplace_back(g.tag, body);
-    });
-    std::sort(members.begin(), members.end());
-    for (const auto& m : members) added[m.second].push_back(place(m.first));
+    all[body].push_back({g.position, g.radius});
+  });
+  return all;
+}
+
+/// World frame, with those of other ranks, and periodic images.
+std::vector<Sphere> BodyMeshes::exterior_granules() const {
+  const Atoms& atoms = ports_.atoms;
+  std::vector<Sphere> all;
+  for (int i = 0; i < atoms.owned + atoms.ghosts; ++i) {
+    const bool in_a_body = i < atoms.owned ? shell_.locked(i) || shown_.is_guest(i) : atoms.is_interface(i);
+    if (!in_a_body) all.push_back(atoms.sphere(i));
   }
-  for (const std::int64_t tag : locked_now) {
-    const int body = bodies.body_of(tag);
-    if (meshes_.count(body)) added[body].push_back(place(tag));
+  const Vec3& periods = solid_.bodies().periods();
+  for (int d = 0; d < 3; ++d) {
+    if (periods[d] == 0) continue;
+    const std::size_t here = all.size();
+    for (const double side : {-1.0, 1.0})
+      for (std::size_t k = 0; k < here; ++k) {
+        all.push_back(all[k]);
+        all.back().centre[d] += side * periods[d];
+      }
   }
-  for (const auto& a : added) {
-    const auto mesh = meshes_.try_emplace(a.first, scales_.voxel(), scales_.closing()).first;
-    mesh->second.set_pose(bodies.pose(a.first));
-    mesh->second.add(a.second);
-  }
+  return all;
+}
+
+/// In the frame of the body.
+std::vector<Sphere> BodyMeshes::near(const InterfaceMesh& mesh, const SphereCells& exterior) const {
+  Vec3 lo, hi;
+  if (!mesh.grid_box(lo, hi)) return {};
+  const Pose& pose = mesh.pose();
+  const Vec3 centre = pose.to_world(0.5 * (lo + hi));
+  const Vec3 half = turned_half_box(pose.turn(), 0.5 * (hi - lo)) + Vec3::Constant(exterior.largest_radius());
+  std::vector<Sphere> found;
+  exterior.for_each_in_box(centre - half, centre + half, [&](std::size_t, const Sphere& s) {
+    found.push_back({pose.to_frame(s.centre), s.radius});
+    return true;
+  });
+  return found;
 }
 
 }  // namespace solidcull

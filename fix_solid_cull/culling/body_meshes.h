@@ -1,46 +1,62 @@
 // Interface meshes of the bodies on this rank, kept once somebody has asked for them (DESIGN section 10).
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <vector>
 
+#include "atom_index.h"
 #include "granule_masses.h"
 #include "interface_mesh.h"
+#include "ports.h"
+#include "shown_bed.h"
 #include "solid.h"
-#include "wake_requests.h"
+#include "sphere_cells.h"
 
 namespace solidcull {
 
-/// Local.
-class BodyMeshes {
+/// Follows each granule that comes to a body or leaves it, and works on what has changed when it is asked. Local.
+class BodyMeshes : public BodyFollower {
  public:
-  BodyMeshes(const Scales& scales, const Solid& solid, const GranuleMasses& masses)
-      : scales_(scales), solid_(solid), masses_(masses) {}
+  BodyMeshes(const Ports& ports, const Scales& scales, const Solid& solid, const Shell& shell, AtomIndex& index,
+             const GranuleMasses& masses, const ShownBed& shown)
+      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), index_(index), masses_(masses), shown_(shown) {}
 
-  bool wanted() const { return wanted_; }
-  /// Whether each body has its mesh, and nothing else has.
-  bool follow_bodies() const;
-  /// The meshes by body number, where their bodies are now; made where they are missing, for which atoms must be indexed.
+  /// The meshes by body number, as granules and bodies are now, or as hold() found them.
   const std::map<int, InterfaceMesh>& ask();
+  /// Whether ask() has something to do.
+  bool behind() const;
 
-  // --- a membership change, in this order
-  /// A ball took granules out of a body.
-  void carve(int body, const Ball& ball);
-  void merged(std::vector<Solid::Merge> merges) { merges_ = std::move(merges); }
-  /// Made anew: bodies that came apart, and what came off them; grown: bodies with these granules, locked just now.
-  void follow(const std::vector<int>& came_apart, const std::vector<std::int64_t>& locked_now);
+  /// What is told stays as it is now, whatever becomes of granules and bodies, until let_go().
+  void hold();
+  void let_go();
+
+  void merged(int gone, int /*kept*/, bool /*same_frame*/) override { drop(gone); }
+  void frame_changed(int body) override { drop(body); }
+  void granule_changed(int body, const Sphere& granule) override;
 
  private:
-  void unite_merged();
-  void update(const std::vector<std::int64_t>& locked_now);
-  const Pose& pose_of_merged(int body) const;
+  using Bodies = std::map<int, std::vector<Sphere>>;
 
+  bool has_all() const;
+  void drop(int body);
+  void update();
+  Bodies interface_granules() const;
+  std::vector<Sphere> exterior_granules() const;
+  std::vector<Sphere> near(const InterfaceMesh& mesh, const SphereCells& exterior) const;
+
+  const Ports& ports_;
   const Scales& scales_;
   const Solid& solid_;
+  const Shell& shell_;
+  AtomIndex& index_;
   const GranuleMasses& masses_;
-  bool wanted_ = false;
+  const ShownBed& shown_;
+  bool wanted_ = false, held_ = false;
+  bool lost_track_ = false;          // granules have changed while they were held
+  bool changed_ = false;             // since they were brought up to date,
+  std::int64_t up_to_date_at_ = -1;  // which was at this step
   std::map<int, InterfaceMesh> meshes_;
-  std::vector<Solid::Merge> merges_;  // in the change under way
 };
 
 }  // namespace solidcull

@@ -45,6 +45,7 @@ void Culling::begin_run() {
     if (!p_.ports.run.periodic[d]) periods[d] = 0;
   p_.solid.set_periods(periods);
   p_.report.membership_changed();  // the deck may have made granules, or deleted some
+  p_.files.begin_run();
   phase_ = Phase::beginning;
 }
 
@@ -116,6 +117,7 @@ void Culling::is_set_up() {
   expect({Phase::beginning}, "is_set_up");
   // other fixes add their forces later: the loads are taken at the start of the first step
   phase_ = Phase::ready;
+  if (p_.solid.has_store()) p_.files.write_due();  // as the engine's dumps show where a run begins
 }
 
 void Culling::initial_step() {
@@ -396,8 +398,13 @@ double Culling::largest_radius(int type) const {
   return type >= 0 && type < static_cast<int>(largest.size()) ? largest[static_cast<std::size_t>(type)] : 0.0;
 }
 
+void Culling::hold_meshes() {
+  interface_meshes();
+  p_.meshes.hold();
+}
+
 const std::map<int, InterfaceMesh>& Culling::interface_meshes() {
-  const bool stand_in = p_.shown.shown() && !p_.meshes.follow_bodies();
+  const bool stand_in = p_.shown.shown() && p_.meshes.behind();
   if (stand_in) p_.shown.stand_in_for_missing(p_.arrivals);
   const auto& meshes = p_.files.ask_meshes();
   if (stand_in) p_.arrivals.clear();

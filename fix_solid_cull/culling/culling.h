@@ -22,7 +22,7 @@ class Culling {
   // --- a run begins
   void begin_run();     ///< contact model, walls and box are known
   void set_up_atoms();  ///< atoms are there, neighbour lists are not
-  void is_set_up();     ///< forces are there, but for what other fixes add later. Local
+  void is_set_up();     ///< forces are there, but for what other fixes add later
 
   // --- a time step
   void initial_step();                                  ///< takes the loads of a run's setup
@@ -61,6 +61,9 @@ class Culling {
   void hide_bed();
   bool bed_is_shown() const { return p_.shown.shown(); }      ///< local
   bool waits_for_run() const { return p_.snapshot.waits(); }  ///< for what a restart file holds. Local
+  /// interface_meshes() stay as they are now until let_meshes_go(), whatever becomes of the granules. Local.
+  void hold_meshes();
+  void let_meshes_go() { p_.meshes.let_go(); }
   /// All granules become exterior. Returns how many were not, over all ranks.
   std::int64_t restore_all();
 

@@ -79,7 +79,7 @@ void Culling::ground_and_press() {
     p_.grounding.share_out_loads();
     return;
   }
-  p_.grounding.update(p_.meshes.wanted());
+  p_.grounding.update();
   if (p_.ports.ranks.any(p_.motion.stale())) {
     p_.index.index(p_.ports.atoms);  // they were sorted since membership changed
     p_.groups.settle();

@@ -28,15 +28,15 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       handover(ports, solid, shell, index, masses, parcels, groups, stored, arrivals),
       lost(ports, solid, shell, index, masses),
       snapshot(ports, scales, solid, shell, index, parcels, gravity, cover),
-      meshes(scales, solid, masses),
       shown(ports, scales, solid, shell, index, groups, wake),
+      meshes(ports, scales, solid, shell, index, masses, shown),
       claims(ports, scales, solid, shell, wake),
       report(ports, solid, shell, groups, motion),
-      files(ports, scales, solid, shell, index, groups, meshes, report),
+      files(ports, scales, solid, shell, groups, meshes, report),
       invariants(ports, scales, solid, shell, groups, stored, census),
       followers{&shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown} {
   solid.set_types(types);
-  for (BodyFollower* f : std::initializer_list<BodyFollower*>{&motion, &grounding, &closure, &handover, &cover})
+  for (BodyFollower* f : std::initializer_list<BodyFollower*>{&motion, &grounding, &closure, &handover, &cover, &meshes})
     solid.followed_by(*f);
 }
 

@@ -45,8 +45,7 @@ struct CullingParts {
   CullingParts(const CullingParts&) = delete;
   /// What a membership change works on.
   MembershipChange::Parts for_change() {
-    return {ports, scales, solid,  shell,    index,   masses,   arrivals, groups,
-            walls, survey, stored, exchange, closure, freezing, meshes};
+    return {ports, scales, solid, shell, index, masses, arrivals, groups, walls, survey, stored, exchange, closure, freezing};
   }
 
   const Ports ports;
@@ -81,8 +80,8 @@ struct CullingParts {
   Handover handover;
   LostAtoms lost;
   Snapshot snapshot;
-  BodyMeshes meshes;
   ShownBed shown;
+  BodyMeshes meshes;
   DeckClaims claims;
 
   Report report;

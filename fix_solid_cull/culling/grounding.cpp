@@ -93,7 +93,7 @@ bool Grounding::is_at_rest(const SolidBody& body, const ActiveBody& loads, const
          body.twist.at(body.pose.to_world(body.mass.centre())).norm() + (spins_on_the_spot ? 0.0 : turns) < slow;
 }
 
-void Grounding::update(bool keep_frames) {
+void Grounding::update() {
   const std::set<int> spanning_held = keys_of_held_spanning_bodies();
   FlatMap<const ActiveBody*> loads;
   for (const ActiveBody& a : motion_.active()) loads[a.number] = &a;
@@ -114,7 +114,7 @@ void Grounding::update(bool keep_frames) {
     }
     if (++looks_at_rest_[number] < looks_to_ground) continue;
     // a body of one granule has moved as the granule alone would: it is culled only now that it stands
-    if (one && body.pose != Pose() && !keep_frames) {
+    if (one && body.pose != Pose()) {
       shell_.to_world_frame(*one, body.pose);
       solid_.reframe_one(number, {ports_.atoms.mass[*one], shell_[*one].place, ports_.atoms.radius[*one], shell_[*one].held});
     }

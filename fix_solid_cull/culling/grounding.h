@@ -22,7 +22,7 @@ class Grounding : public BodyFollower {
 
   /// At each look: bodies at rest at walls that stand still are grounded; those that the walls might not hold any more wait to be
   /// let go. `keep_frames`: bodies of one granule keep their own frame. Collective.
-  void update(bool keep_frames);
+  void update();
   /// Which elements bear what presses on a body: those that bear the body. Collective; each look ends with it.
   void share_out_loads();
   /// Bodies that were to be let go are. When their granules at walls can come back. Local.

@@ -38,7 +38,7 @@ void Handover::leave(const std::vector<std::int64_t>& atoms, const std::vector<s
   for (const std::int64_t tag : stored) solid_.bring_back(tag, record);
   for (std::size_t k = 0; k < leaving.size(); ++k) solid_.unlock(leaving[k], masses[k]);
   for (const std::int64_t tag : leaving) solid_.leave_rank(tag);
-  split_bodies(solid_, shell_, index_, masses_);
+  split_bodies(ports_.atoms, solid_, shell_, index_, masses_);
 }
 
 bool Handover::send_home() {

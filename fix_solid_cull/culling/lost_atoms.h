@@ -47,7 +47,7 @@ class LostAtoms {
     index_.index(ports_.atoms);
     for (const LostGranule& b : lost) solid_.unlock(b.tag, b.granule);
     for (const LostGranule& b : lost) solid_.thaw(b.tag);
-    split_bodies(solid_, shell_, index_, masses_);
+    split_bodies(ports_.atoms, solid_, shell_, index_, masses_);
     return true;
   }
   void release_memory() { before_.shrink_to_fit(); }

@@ -112,31 +112,14 @@ void MembershipChange::tell_neighbours() {
 
 void MembershipChange::thaw_and_unlock() {
   p_.freezing.thaw(changes_);
-  if (p_.meshes.wanted()) carve_meshes();
   for (const std::int64_t tag : changes_.freed) leave_body(tag);
   changes_.freed_anywhere.for_each([&](std::int64_t tag, char) { p_.solid.thaw(tag); });
-  split_bodies(p_.solid, p_.shell, p_.index, p_.masses);
+  split_bodies(p_.ports.atoms, p_.solid, p_.shell, p_.index, p_.masses);
   for (const std::int64_t tag : changes_.freed) {
     const int i = p_.index.at(tag), body = p_.shell[i].body;
     if (p_.scales.sleeping() && body && !p_.solid.exists(body)) p_.solid.forget(body);
     p_.shell.left_body(i);
   }
-}
-
-/// Which ball took granules from which body, in the body's frame.
-void MembershipChange::carve_meshes() {
-  std::map<std::pair<int, std::size_t>, Ball> cuts;
-  for (const std::int64_t tag : changes_.freed) {
-    const int body = p_.solid.bodies().body_of(tag);
-    const Pose& pose = p_.solid.bodies().pose(body);
-    const Vec3 x = pose.to_world(p_.shell[p_.index.at(tag)].place);
-    for (std::size_t b = 0; b < wakes_.balls.size(); ++b) {
-      const Ball& ball = wakes_.balls[b];
-      if ((x - ball.centre).norm() <= ball.radius)
-        cuts.emplace(std::make_pair(body, b), Ball{pose.to_frame(ball.centre), ball.radius});
-    }
-  }
-  for (const auto& cut : cuts) p_.meshes.carve(cut.first.first, cut.second);
 }
 
 void MembershipChange::leave_body(std::int64_t tag) {
@@ -163,8 +146,7 @@ void MembershipChange::leave_body(std::int64_t tag) {
 void MembershipChange::freeze_and_lock() {
   p_.freezing.freeze(changes_, proposal_);
   lock_into_bodies();
-  std::vector<Solid::Merge> merges = adopt_places(p_.ports.atoms, p_.solid, p_.shell, p_.arrivals);
-  if (p_.meshes.wanted()) p_.meshes.merged(std::move(merges));
+  adopt_places(p_.ports.atoms, p_.solid, p_.shell, p_.arrivals);
 }
 
 void MembershipChange::lock_into_body(std::int64_t tag) {
@@ -205,7 +187,6 @@ void MembershipChange::lock_into_bodies() {
 void MembershipChange::finish_bodies() {
   p_.freezing.freeze_between_merged();
   p_.solid.turn_frozen();
-  p_.meshes.follow(p_.solid.bodies().split_parents(), changes_.locked);
 }
 
 }  // namespace solidcull

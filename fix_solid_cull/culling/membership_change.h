@@ -6,7 +6,6 @@
 
 #include "atom_index.h"
 #include "body_groups.h"
-#include "body_meshes.h"
 #include "contact_freezing.h"
 #include "granule_masses.h"
 #include "ports.h"
@@ -39,7 +38,6 @@ class MembershipChange {
     StoreExchange& exchange;
     ShellClosure& closure;
     ContactFreezing& freezing;
-    BodyMeshes& meshes;
   };
 
   MembershipChange(const Parts& parts, Wakes wakes, Proposal proposal);
@@ -54,7 +52,7 @@ class MembershipChange {
   void thaw_and_unlock();
   /// Contacts of what is locked are frozen, and bodies grow or merge. Local.
   void freeze_and_lock();
-  /// After the bodies' motions are settled: contacts between merged bodies are frozen, histories turned, meshes follow.
+  /// After the bodies' motions are settled: contacts between merged bodies are frozen, histories turned.
   /// Collective.
   void finish_bodies();
 
@@ -69,7 +67,6 @@ class MembershipChange {
   void unlock(int i);
   bool still_rests(int i) const;
   void leave_body(std::int64_t tag);
-  void carve_meshes();
   void lock_into_body(std::int64_t tag);
   void lock_into_bodies();
 

@@ -16,12 +16,27 @@ std::string OutputFiles::file_of_step(const std::string& pattern) const {
   return pattern.substr(0, star) + std::to_string(ports_.run.deck_step()) + pattern.substr(star + 1);
 }
 
+void OutputFiles::begin_run() {
+  for (const auto* outputs : {&scales_.settings().meshes, &scales_.settings().beds}) {
+    const char* const keyword = outputs == &scales_.settings().beds ? "bed" : "mesh";
+    for (const Output& o : *outputs) {
+      on_root(keyword, [&] { check_folder_of(o.file); });
+      if (o.file.find('*') == std::string::npos && said_.insert(o.file).second)
+        ports_.run.say("keyword '" + std::string(keyword) + "': " + o.file +
+                       " has no '*' for the step in its name, and holds the last state only");
+    }
+  }
+}
+
 void OutputFiles::write_due() {
-  const auto due = [&](int every) { return every > 0 && ports_.run.deck_step() % every == 0; };
+  const std::int64_t step = ports_.run.deck_step();
+  if (step == written_at_) return;
+  const auto due = [&](int every) { return every > 0 && step % every == 0; };
   for (const Output& o : scales_.settings().meshes)
     if (due(o.every)) write_meshes(file_of_step(o.file));
   for (const Output& o : scales_.settings().beds)
     if (due(o.every)) write_bed(file_of_step(o.file));
+  written_at_ = step;
 }
 
 /// Rank 0 writes; if it cannot, all ranks stop.
@@ -41,42 +56,62 @@ void OutputFiles::on_root(const char* keyword, Write write) {
 
 const std::map<int, InterfaceMesh>& OutputFiles::ask_meshes() {
   const auto timed = report_.time(Part::mesh);
-  if (!meshes_.follow_bodies()) index_.index(ports_.atoms);
   return meshes_.ask();
 }
 
-/// On rank 0 each body's mesh, by key: each rank sends its part, and the parts are united. Empty elsewhere.
-std::map<int, InterfaceMesh> OutputFiles::whole_meshes() {
+/// Each body's mesh on rank 0, by key, where the meshes of this rank are `here`: each rank sends its parts, and those of one body
+/// are united in `parts`. Nothing elsewhere.
+std::map<int, const InterfaceMesh*> OutputFiles::whole_meshes(const std::map<int, InterfaceMesh>& here,
+                                                              std::map<int, InterfaceMesh>& parts) {
+  const auto timed = report_.time(Part::mesh);
   struct Head {
     int key;
     std::size_t bytes;
   };
   std::vector<Head> heads;
   std::vector<char> bytes;
-  for (const auto& [body, mesh] : ask_meshes()) {
+  for (const auto& [body, mesh] : here) {
+    if (ports_.ranks.me == 0) break;
     const std::string part = mesh.to_bytes();
     heads.push_back({groups_.key_of(body), part.size()});
     bytes.insert(bytes.end(), part.begin(), part.end());
   }
-  heads = ports_.ranks.gather_on_root(heads);
-  bytes = ports_.ranks.gather_on_root(bytes);
-  std::map<int, InterfaceMesh> whole;
+  if (ports_.ranks.count > 1) {
+    heads = ports_.ranks.gather_on_root(heads);
+    bytes = ports_.ranks.gather_on_root(bytes);
+  }
+  std::map<int, const InterfaceMesh*> whole;
   if (ports_.ranks.me != 0) return whole;
+  std::map<int, int> parts_of;
+  for (const Head& h : heads) ++parts_of[h.key];
+  for (const auto& body : here) ++parts_of[groups_.key_of(body.first)];
+  const auto add = [&](int key, const std::string& part) {
+    InterfaceMesh mesh = InterfaceMesh::from_bytes(part, scales_.voxel(), scales_.closing());
+    const auto there = parts.find(key);
+    if (there == parts.end())
+      parts.emplace(key, std::move(mesh));
+    else
+      there->second.merge(std::move(mesh));
+  };
+  for (const auto& [body, mesh] : here) {
+    const int key = groups_.key_of(body);
+    if (parts_of[key] == 1)
+      whole[key] = &mesh;
+    else
+      add(key, mesh.to_bytes());
+  }
   const char* at = bytes.data();
   for (const Head& h : heads) {
-    InterfaceMesh part = InterfaceMesh::from_bytes(std::string(at, h.bytes), scales_.voxel(), scales_.closing());
+    add(h.key, std::string(at, h.bytes));
     at += h.bytes;
-    const auto there = whole.find(h.key);
-    if (there == whole.end())
-      whole.emplace(h.key, std::move(part));
-    else
-      there->second.merge(std::move(part));
   }
+  for (const auto& [key, part] : parts) whole[key] = &part;
   return whole;
 }
 
 void OutputFiles::write_meshes(const std::string& file) {
-  const std::map<int, InterfaceMesh> whole = whole_meshes();
+  std::map<int, InterfaceMesh> parts;
+  const std::map<int, const InterfaceMesh*> whole = whole_meshes(ask_meshes(), parts);
   const auto timed = report_.time(Part::files);
   on_root("mesh", [&] {
     const std::string ending = file.substr(file.size() - 4);
@@ -84,7 +119,7 @@ void OutputFiles::write_meshes(const std::string& file) {
       std::vector<const InterfaceMesh*> grids;
       std::vector<std::string> names;
       for (const auto& w : whole) {
-        grids.push_back(&w.second);
+        grids.push_back(w.second);
         names.push_back("body_" + std::to_string(w.first));
       }
       write_vdb(file, grids, names);
@@ -93,7 +128,7 @@ void OutputFiles::write_meshes(const std::string& file) {
     TriangleMesh all;
     std::vector<int> body;
     for (const auto& w : whole) {
-      const TriangleMesh part = w.second.triangles();
+      const TriangleMesh part = w.second->triangles();
       const auto first = static_cast<std::uint32_t>(all.vertices.size());
       all.vertices.insert(all.vertices.end(), part.vertices.begin(), part.vertices.end());
       for (const auto& t : part.triangles) all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});

@@ -1,6 +1,9 @@
 // Outputs: interface meshes and the whole bed.
 #pragma once
 
+#include <cstdint>
+#include <map>
+#include <set>
 #include <string>
 
 #include "body_groups.h"
@@ -16,18 +19,13 @@ namespace solidcull {
 /// Files are written whole or not at all; one that cannot be written is an InputError on all ranks.
 class OutputFiles {
  public:
-  OutputFiles(const Ports& ports, const Scales& scales, const Solid& solid, Shell& shell, AtomIndex& index,
-              const BodyGroups& groups, BodyMeshes& meshes, Report& report)
-      : ports_(ports),
-        scales_(scales),
-        solid_(solid),
-        shell_(shell),
-        index_(index),
-        groups_(groups),
-        meshes_(meshes),
-        report_(report) {}
+  OutputFiles(const Ports& ports, const Scales& scales, const Solid& solid, Shell& shell, const BodyGroups& groups,
+              BodyMeshes& meshes, Report& report)
+      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), groups_(groups), meshes_(meshes), report_(report) {}
 
-  /// What is due at this step. Collective.
+  /// A run begins: files can be written where they are to be. Collective.
+  void begin_run();
+  /// What is due at this step, once. Collective.
   void write_due();
   /// The meshes where their bodies are now; see BodyMeshes. Local.
   const std::map<int, InterfaceMesh>& ask_meshes();
@@ -35,7 +33,7 @@ class OutputFiles {
  private:
   void write_meshes(const std::string& file);
   void write_bed(const std::string& file);
-  std::map<int, InterfaceMesh> whole_meshes();
+  std::map<int, const InterfaceMesh*> whole_meshes(const std::map<int, InterfaceMesh>& here, std::map<int, InterfaceMesh>& parts);
   std::string file_of_step(const std::string& pattern) const;
   template <class Write>
   void on_root(const char* keyword, Write write);
@@ -44,10 +42,11 @@ class OutputFiles {
   const Scales& scales_;
   const Solid& solid_;
   Shell& shell_;
-  AtomIndex& index_;
   const BodyGroups& groups_;
   BodyMeshes& meshes_;
   Report& report_;
+  std::int64_t written_at_ = -1;  // a step of the deck
+  std::set<std::string> said_;    // of files that are written over
 };
 
 }  // namespace solidcull

@@ -245,7 +245,7 @@ void Parcels::take_as_it_was(const Parcel& p) {
     const Parcel::Granule& g = p.granules[k];
     const int body = number_.at(static_cast<std::size_t>(g.body));
     if (!g.record) {
-      solid_.take_in(g.tag, body);
+      solid_.take_in(g.tag, body, {g.place, g.radius});
       shell_.arrives(index_.at(g.tag), {body, g.place});
       continue;
     }

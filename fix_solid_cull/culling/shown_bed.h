@@ -25,6 +25,12 @@ class ShownBed : public FollowsAtoms {
       : ports_(ports), scales_(scales), solid_(solid), shell_(shell), index_(index), groups_(groups), wake_(wake) {}
 
   bool shown() const { return shown_; }
+  /// Whether owned atom i is a stored granule that is shown. Local.
+  bool is_guest(int i) const {
+    if (!shown_) return false;
+    const Name& name = names_[static_cast<std::size_t>(i)];
+    return name.home != nobody && (name.home != ports_.ranks.me || granules_[static_cast<std::size_t>(name.number)].stored);
+  }
   /// Contact histories are up to date, and there are no ghosts. Local.
   void show();
   /// The interface granules as they were shown: commands may have deleted some or sent them elsewhere. Local.

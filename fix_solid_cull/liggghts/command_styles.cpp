@@ -79,7 +79,7 @@ constexpr CommandStyle styles[] = {
     {"run", run},
     {"run_time", run},
 
-    {"write_restart", state},
+    {"write_restart", state},  // but see below
 
     {"create_atoms", whole_bed},
     {"delete_atoms", whole_bed},  // but see below
@@ -128,6 +128,7 @@ bool compute_reads_granules(const std::string& style) {
 
 Sight sight_of(const std::string& command, const std::vector<std::string>& words, bool engine_has_it) {
   if (command == "delete_atoms" && renumbers(words)) return all_restored;
+  if (command == "write_restart" && words.size() > 1 && words[1] == "region") return all_restored;  // some granules only
   if (command == "fix" && words.size() > 2 && fix_reads_granules(words[2])) return whole_bed;
   if (command == "compute" && words.size() > 2 && compute_reads_granules(words[2])) return whole_bed;
   const CommandStyle& found = row_of(command, styles, not_known);

@@ -14,6 +14,7 @@
 #include "formulas.h"
 #include "group.h"
 #include "lammps.h"
+#include "mesh_regions.h"
 #include "modify.h"
 #include "restart_files.h"
 #include "update.h"
@@ -109,6 +110,8 @@ MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, 
   // fix insert/stream then moves the step at which each granule was released
   if (resets_ && lmp->modify->find_fix(releases_id) >= 0) sight = Sight::whole_bed;
   if (is_own_line(command, words, n)) sight = fix ? Sight::all_restored : Sight::nothing;
+  const std::string refused = why_no_interface_mesh_for_command(lmp, command, n, words);
+  if (!refused.empty()) lmp->error->all(FLERR, refused.c_str());
   if (is(command, "pair_style") && (!fix || fix->waits_for_run())) sight = Sight::nothing;  // it comes right after read_restart
   if (fix && !fix->waits_for_run() && !fix->in_run() && is(command, "unfix") && n > 0 && is(words[0], fix->id))
     restore(lmp, *fix, nullptr);  // numbers may be read after the fix has gone

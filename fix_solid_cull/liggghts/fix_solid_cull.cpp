@@ -15,6 +15,7 @@
 #include "error.h"
 #include "input_error.h"
 #include "interpositions.h"
+#include "mesh_regions.h"
 #include "modify.h"
 #include "restart_files.h"
 #include "run_failure.h"
@@ -149,6 +150,7 @@ void FixSolidCull::init() {
 }
 
 void FixSolidCull::setup_pre_exchange() {
+  bodies_have_changed();
   hand_on([&] { culling_->set_up_atoms(); });
 }
 
@@ -174,6 +176,7 @@ void FixSolidCull::post_integrate() {
 }
 
 void FixSolidCull::pre_exchange() {
+  bodies_have_changed();
   hand_on([&] { culling_->change(); });
   vector_atom = culling_->labels();  // arrays may have been cut
 }
@@ -218,13 +221,18 @@ void FixSolidCull::run_begins() {
   hand_on([&] {
     if (rules_.find_movable(atoms_, run_)) culling_->show_bed();  // to see who may still be culled
     culling_->hide_bed();
+    culling_->let_meshes_go();
   });
+  bodies_have_changed();
   in_run_ = true;
 }
 
 void FixSolidCull::show_bed_here() {
   const bool before = culling_->bed_is_shown();
-  hand_on([&] { culling_->show_bed(); });
+  hand_on([&] {
+    if (!before && has_interface_mesh(lmp)) culling_->hold_meshes();
+    culling_->show_bed();
+  });
   static int all = 0;  // of all fixes in this process
   if (culling_->bed_is_shown() && !before) show_ = ++all;
 }
@@ -263,7 +271,10 @@ void FixSolidCull::hide_bed() {
 }
 
 bool FixSolidCull::restore_all(const char* command) {
-  const bool some = hand_on([&] { return culling_->restore_all() > 0; });
+  const bool some = hand_on([&] {
+    if (command && has_interface_mesh(lmp)) culling_->hold_meshes();
+    return culling_->restore_all() > 0;
+  });
   if (some && command) run_.say("'" + std::string(command) + "' may change which granules there are: all are exterior now");
   vector_atom = culling_->labels();
   return some;

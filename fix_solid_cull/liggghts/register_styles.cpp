@@ -15,6 +15,7 @@
 #include "lammps.h"
 #include "memory.h"
 #include "mesh_loads.h"
+#include "mesh_regions.h"
 #include "modify.h"
 #include "program_calls.h"
 #include "region_interface_mesh.h"
@@ -55,6 +56,8 @@ void Modify::add_fix(int narg, char** arg, char* suffix) {
   using Original = void (*)(Modify*, int, char**, char*);
   static const auto original = own<Call::add_fix, Original>();
   solidcull::engine::fix_styles(*this)["solid/cull"] = make_fix;
+  const std::string refused = solidcull::why_no_interface_mesh_for_fix(lmp, narg, arg);
+  if (!refused.empty()) error->all(FLERR, refused.c_str());
   if (narg > 2) solidcull::WallContacts::fix_was_made(arg[2]);
   original(this, narg, arg, suffix);
 }
@@ -125,6 +128,7 @@ void Domain::add_region(int narg, char** arg) {
     add_interface_mesh(lmp, narg, arg);
   else
     original(this, narg, arg);
+  solidcull::region_was_made(lmp, narg, arg);
 }
 
 /// What is culled goes to the end of the file, which has its name when it is whole.

@@ -86,6 +86,8 @@ void Solid::split(const MassOf& mass_of, const std::function<void(std::int64_t, 
     const int from = store_->body_of(tag);
     if (store_->frame_of(from) == GranuleStore::shared_frame) store_->share(body, true);
     wall_loads_.move(tag, from, body);
+    const Resident g = *store_->find(tag);
+    changed(from, {g.position, g.radius});
     store_->move(tag, body, place);
   });
   if (!scales_.sleeping()) return;
@@ -98,7 +100,7 @@ void Solid::turn_contacts(std::int64_t tag, const Eigen::Matrix3d& by) {
   contacts_.turn(tag, by, [&](std::int64_t partner) { return partner > tag || !bodies_.body_of(partner); });
 }
 
-std::vector<Solid::Merge> Solid::adopt_swallowed() {
+void Solid::adopt_swallowed() {
   for (const auto& gone : bodies_.swallowed()) {
     const int body = bodies_.root(gone.first);
     const Pose &from = gone.second, &to = bodies_.pose(body);
@@ -114,24 +116,26 @@ std::vector<Solid::Merge> Solid::adopt_swallowed() {
         contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { contacts_.add(tag, partner, nullptr); });
     }
     store_->merge(gone.first, body, [&](StoredGranule& g) {
-      if (same) return;
+      if (same) {
+        changed(body, {g.position, g.radius});
+        return;
+      }
       g.position = to.to_frame(from.to_world(g.position));
       g.load_change = turn * g.load_change;
       turn_contacts(g.tag, turn);
-      if (!scales_.refills()) return;
-      const Vec3 site = free_site(body, g.position, g.radius);
-      bodies_.relocate(body, {g.mass, g.position, g.radius, g.held}, site);
-      g.position = site;
+      if (scales_.refills()) {
+        const Vec3 site = free_site(body, g.position, g.radius);
+        bodies_.relocate(body, {g.mass, g.position, g.radius, g.held}, site);
+        g.position = site;
+      }
+      changed(body, {g.position, g.radius});
     });
     for (const std::int64_t tag : moved) drop_what_sites_tell(tag);
     wall_loads_.merge(gone.first, body);
     tell([&](BodyFollower& f) { f.merged(gone.first, body, same); });
     if (scales_.sleeping()) find_grid(body);
   }
-  std::vector<Merge> merges;
-  for (const auto& m : bodies_.take_merges()) merges.push_back({m.first, m.second, bodies_.pose(m.second)});
   bodies_.forget_swallowed();
-  return merges;
 }
 
 void Solid::ground(int body, bool on) {
@@ -256,7 +260,7 @@ StoredGranule Solid::as_stored(const StoredGranule& g) {
   if (scales_.refills()) {
     StoredGranule at_site = g;
     at_site.position = free_site(g.body, g.position, g.radius);
-    bodies_.relocate(g.body, {g.mass, g.position, g.radius, g.held}, at_site.position);
+    relocate(g.body, {g.mass, g.position, g.radius, g.held}, at_site.position);
     return store_->rounded(at_site);
   }
   const StoredGranule kept = store_->rounded(g);
@@ -293,6 +297,7 @@ void Solid::add_stored(const StoredGranule& g, const double* record, int length)
   store_->add(g, record, length);
   ledger_.stored(g);
   know_radius(g.type, g.radius);
+  changed(g.body, {g.position, g.radius});
 }
 
 void Solid::add_stored(const StoredGranule& g, const double* record, int length, const ContactList& contacts) {
@@ -305,6 +310,7 @@ void Solid::add_stored(const StoredGranule& g, const double* record, int length,
   for (std::size_t k = 0; k < contacts.size(); ++k)
     if (!kept[k]) contacts_.add(g.tag, contacts.partner(k), contacts.history(k));
   entered_store(g.tag);
+  changed(g.body, {g.position, g.radius});
 }
 
 std::size_t Solid::fit() {

@@ -30,6 +30,8 @@ class BodyFollower {
   /// Its stored granules have left the grid that bodies share which stand still.
   virtual void left_shared_grid(int /*body*/) {}
   virtual void forgotten(int /*body*/) {}  ///< nothing of it is left
+  /// One of its granules is, or was until now, at this place in its frame: it came, left, or stands elsewhere.
+  virtual void granule_changed(int /*body*/, const Sphere& /*granule*/) {}
 };
 
 /// SI units. Local to the rank.
@@ -98,23 +100,22 @@ class Solid {
 
   // --- bodies
   SolidBodies::Place lock(std::int64_t tag, const MovingGranule& granule, const MassOf& mass_of) {
-    return bodies_.lock(tag, granule, contacts_, mass_of);
+    const SolidBodies::Place at = bodies_.lock(tag, granule, contacts_, mass_of);
+    changed(at.body, {at.position, granule.radius});
+    return at;
   }
   void tie(std::int64_t a, std::int64_t b, const MassOf& mass_of) { bodies_.join(a, b, mass_of); }
   /// See SolidBodies::unlock.
   void unlock(std::int64_t tag, const GranuleMass& granule, const MovingGranule* given = nullptr) {
+    changed(bodies_.body_of(tag), {granule.position, granule.radius});
     bodies_.unlock(tag, granule, contacts_, given);
   }
   /// After unlock(): bodies that came apart become several. moved(tag, body, place) is called for granules of a part that came
   /// off which are no stored ones.
   void split(const MassOf& mass_of, const std::function<void(std::int64_t, int, const Vec3&)>& moved);
-  struct Merge {
-    int kept, swallowed;
-    Pose pose;  // of the swallowed one
-  };
   /// After lock() and tie(): the stored granules of swallowed bodies move to the frames in which they are now; the interface
-  /// granules' contacts were turned before, see turn_contacts(). Returns the merges since the last call, in their order.
-  std::vector<Merge> adopt_swallowed();
+  /// granules' contacts were turned before, see turn_contacts().
+  void adopt_swallowed();
   /// Histories of this granule's contacts turn with its frame; those shared with another member only once, by the lower tag.
   void turn_contacts(std::int64_t tag, const Eigen::Matrix3d& by);
   SolidBody& body(int number) { return bodies_.body(number); }
@@ -140,7 +141,13 @@ class Solid {
   /// g as the store will hold it; what it moves by then is told to its body. With `store none` it takes the nearest free site.
   StoredGranule as_stored(const StoredGranule& g);
   /// An interface granule stands elsewhere in its body from here on (frame of the body).
-  void relocate(int body, const GranuleMass& granule, const Vec3& to) { bodies_.relocate(body, granule, to); }
+  void relocate(int body, const GranuleMass& granule, const Vec3& to) {
+    bodies_.relocate(body, granule, to);
+    changed(body, {granule.position, granule.radius});
+    changed(body, {to, granule.radius});
+  }
+  /// It stands in another body from here on, or in another frame of its own.
+  void stands(int body, const Sphere& granule) { changed(body, granule); }
   /// So many granules are about to be put away. If they are many beside what is stored, a bed comes to rest, and an exact store
   /// packs their contacts. Few are what a wave woke and will wake again: theirs stay in the graph. What is packed, or is not,
   /// stays so.
@@ -157,7 +164,10 @@ class Solid {
 
   // --- from a restart file or another rank; enter_store() once all contacts are there
   int found(const SolidBody& body);
-  void take_in(std::int64_t tag, int body) { bodies_.take_in(tag, body); }
+  void take_in(std::int64_t tag, int body, const Sphere& granule) {
+    bodies_.take_in(tag, body);
+    changed(body, granule);
+  }
   void add_stored(const StoredGranule& g, const double* record, int length);
   void enter_store(std::int64_t tag);
   /// Both at once, for a granule with all contacts that it has with granules which are stored already.
@@ -190,6 +200,9 @@ class Solid {
   void leaves_store(std::int64_t tag);
   void entered_store(std::int64_t tag);
   void drop_what_sites_tell(std::int64_t tag);
+  void changed(int body, const Sphere& granule) {
+    tell([&](BodyFollower& f) { f.granule_changed(body, granule); });
+  }
   template <class Tell>
   void tell(Tell tell) {
     for (BodyFollower* f : followers_) tell(*f);

@@ -191,7 +191,6 @@ int SolidBodies::merge(int a, int b, Vec3 shift) {
   swallowed_[b] = gone.pose;
   bodies_.erase(b);
   parent_[b] = a;
-  merges_.emplace_back(a, b);
   return a;
 }
 
@@ -372,7 +371,5 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
     }
   }
 }
-
-std::vector<std::pair<int, int>> SolidBodies::take_merges() { return std::exchange(merges_, {}); }
 
 }  // namespace solidcull

@@ -250,9 +250,6 @@ class SolidBodies {
   int root(int body) const;
   void forget_swallowed() { swallowed_.clear(); }
 
-  /// Pairs (kept, swallowed) of the merges since the last call, in their order: what happened to the interface meshes.
-  std::vector<std::pair<int, int>> take_merges();
-
  private:
   int found();
   int merge(int a, int b, Vec3 shift);
@@ -272,7 +269,6 @@ class SolidBodies {
   std::map<int, SolidBody> bodies_;     // living bodies only
   std::map<int, Pose> swallowed_;
   std::vector<std::int64_t> cut_;  // locked neighbours of unlocked granules
-  std::vector<std::pair<int, int>> merges_;
   std::vector<int> split_parents_;
 };
 

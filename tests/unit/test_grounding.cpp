@@ -46,7 +46,7 @@ struct Resting {
   void look() {
     parts.walls.update(world.walls.contacts(), false);
     parts.motion.refresh();
-    parts.grounding.update(false);
+    parts.grounding.update();
     parts.groups.settle();
     parts.motion.refresh();
     parts.grounding.share_out_loads();

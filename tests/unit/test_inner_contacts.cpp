@@ -56,7 +56,7 @@ struct Packing {
       g.mass = g.radius;
       g.position = size * Vec3(share(), share(), share());
       granules[tag] = solid.store().rounded(g);
-      solid.take_in(tag, body);
+      solid.take_in(tag, body, {granules[tag].position, granules[tag].radius});
     }
     for (const auto& [a, g] : granules)
       for (const auto& [c, h] : granules) {

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "mesh_files.h"
+#include "mesh_of.h"
 
 namespace solidcull {
 namespace {
@@ -163,8 +164,7 @@ TEST_F(MeshFiles, bed_vtp_holds_every_column) {
 }
 
 TEST_F(MeshFiles, vdb_is_written_whole) {
-  InterfaceMesh mesh(1e-3, 0.0), other(1e-3, 0.0);
-  mesh.add({{Vec3::Zero(), 5e-3}});
+  const InterfaceMesh mesh = mesh_of({{Vec3::Zero(), 5e-3}}, 1e-3, 0.0), other(1e-3, 0.0);
   write_vdb(path("m.vdb"), {&mesh, &other}, {"body 1", "body 2"});
   const std::string bytes = content(path("m.vdb"));
   EXPECT_EQ(bytes.substr(0, 4), " BDV");
@@ -207,6 +207,13 @@ TEST_F(MeshFiles, say_why_they_cannot_be_written_and_leave_nothing) {
     EXPECT_FALSE(fs::exists(full)) << c.name;
     EXPECT_TRUE(nothing_left_over()) << c.name;
   }
+}
+
+TEST_F(MeshFiles, a_folder_that_is_not_there_is_known_before_the_first_write) {
+  EXPECT_NO_THROW(check_folder_of(path("file")));
+  EXPECT_EQ(error_of([&] { check_folder_of(path("absent/file")); }),
+            "cannot write " + path("absent/file") + ": No such file or directory");
+  EXPECT_NO_THROW(check_folder_of("file.*.vtp"));
 }
 
 TEST_F(MeshFiles, a_failed_write_keeps_the_file_that_was_there) {

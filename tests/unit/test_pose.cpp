@@ -15,6 +15,7 @@
 
 #include "interface_mesh.h"
 #include "mesh_files.h"
+#include "mesh_of.h"
 #include "pose.h"
 
 namespace solidcull {
@@ -170,11 +171,7 @@ const Pose flown(Vec3(0.31, -0.24, 0.52), Quaterniond(AngleAxisd(1.1, Vec3(1, 2,
 
 /// A lattice with a bite, of which one stands at the origin and one where it was carried.
 InterfaceMesh bitten(const Pose& pose = Pose()) {
-  InterfaceMesh mesh(voxel, voxel);
-  mesh.add(lattice(5, 2 * voxel));
-  mesh.set_pose(pose);
-  mesh.carve({Vec3(8, 8, 8) * voxel, 5 * voxel});
-  return mesh;
+  return mesh_of(without(lattice(5, 2 * voxel), {Vec3(8, 8, 8) * voxel, 5 * voxel}), voxel, voxel, pose);
 }
 
 TEST(InterfaceMeshInFlight, stands_at_the_origin_at_first) {
@@ -320,15 +317,9 @@ TEST(InterfaceMeshInFlight, meshes_in_different_poses_merge_where_they_are) {
   for (int n = 0; n < 5; ++n) {
     TwoBodies two{lattice(6, 2 * voxel), lattice(5, 2 * voxel, Vec3(12, 1, -1) * voxel), random.pose(0.1), random.pose(0.1)};
     if (n == 0) two.first = Pose();
-    InterfaceMesh a(voxel, voxel), b(voxel, voxel), reference(voxel, voxel), other(voxel, voxel);
-    a.add(two.here);
-    b.add(two.there_in_its_frame());
-    a.set_pose(two.first);
-    b.set_pose(two.second);
-    reference.add(two.here);
-    other.add(two.there);
-    reference.set_pose(two.first);
-    other.set_pose(two.first);
+    InterfaceMesh a = mesh_of(two.here, voxel, voxel, two.first);
+    InterfaceMesh b = mesh_of(two.there_in_its_frame(), voxel, voxel, two.second);
+    InterfaceMesh reference = mesh_of(two.here, voxel, voxel, two.first), other = mesh_of(two.there, voxel, voxel, two.first);
     reference.merge(std::move(other));
     a.merge(std::move(b));
     EXPECT_EQ(a.pose(), two.first);
@@ -337,7 +328,8 @@ TEST(InterfaceMeshInFlight, meshes_in_different_poses_merge_where_they_are) {
     std::printf("merged in different poses: volume off by %.1e (relative)\n", a.volume() / reference.volume() - 1);
     EXPECT_NEAR(a.volume(), reference.volume(), 0.02 * reference.volume());
     expect_same_solid(a, reference, two.first, Vec3(-4, -4, -4) * voxel, Vec3(24, 15, 15) * voxel);
-    b.add(two.there_in_its_frame());  // may be used again, where it was
+    const std::vector<Sphere> again = two.there_in_its_frame();
+    b.update(granules_of(again), largest_of(again));  // may be used again, where it was
     EXPECT_TRUE(b.inside(two.first.to_world(two.there[0].centre)));
   }
 }
@@ -345,10 +337,8 @@ TEST(InterfaceMeshInFlight, meshes_in_different_poses_merge_where_they_are) {
 TEST(InterfaceMeshInFlight, a_merge_turns_by_the_difference_of_the_poses_only) {
   // both carried together by a quarter turn and whole voxels: the grids match, and the surface is the one in one frame
   const Pose quarter(Vec3(3, -2, 5) * voxel, Quaterniond(AngleAxisd(M_PI / 2, Vec3::UnitY())));
-  InterfaceMesh a(voxel, 0.0), b(voxel, 0.0);
   const Sphere ball{Vec3(0.3, 0.1, -0.2) * voxel, 8 * voxel};
-  b.add({ball});
-  b.set_pose(quarter);
+  InterfaceMesh a(voxel, 0.0), b = mesh_of({ball}, voxel, 0.0, quarter);
   a.merge(std::move(b));
   const Vec3 centre = quarter.to_world(ball.centre);
   EXPECT_NEAR(a.volume(), 4.0 / 3.0 * M_PI * std::pow(ball.radius, 3), 0.02 * a.volume());
@@ -360,16 +350,14 @@ TEST(InterfaceMeshInFlight, a_merge_turns_by_the_difference_of_the_poses_only) {
 }
 
 TEST(InterfaceMeshInFlight, a_merge_keeps_cavities_open) {
-  const double radius = 14 * voxel, hole = 6 * voxel;
-  InterfaceMesh a(voxel, 0.0), b(voxel, 0.0);
-  a.add({{Vec3(-30, 0, 0) * voxel, 5 * voxel}});
-  b.add({{Vec3::Zero(), radius}});
-  b.carve({Vec3(2, 1, 0) * voxel, hole});
-  b.set_pose(flown);
+  // of granules that overlap and leave no pores, around a hole
+  std::vector<Sphere> granules = without(lattice(10, 3 * voxel, Vec3(-13, -13, -13) * voxel), {Vec3(2, 1, 0) * voxel, 8 * voxel});
+  for (Sphere& s : granules) s.radius = 3 * voxel;
+  InterfaceMesh a = mesh_of({{Vec3(-30, 0, 0) * voxel, 5 * voxel}}, voxel, 0.0), b = mesh_of(granules, voxel, 0.0, flown);
   const double separate = a.volume() + b.volume();
   ASSERT_FALSE(b.inside(flown.to_world(Vec3(2, 1, 0) * voxel)));
   a.merge(std::move(b));
-  EXPECT_FALSE(a.inside(flown.to_world(Vec3(2, 1, 0) * voxel))) << "what was carved out within the body is filled";
+  EXPECT_FALSE(a.inside(flown.to_world(Vec3(2, 1, 0) * voxel))) << "a hole within the body is filled";
   EXPECT_NEAR(a.volume(), separate, 0.02 * separate);
 }
 
@@ -390,14 +378,10 @@ TEST(InterfaceMeshInFlight, a_merge_with_nothing_changes_nothing) {
 TEST(InterfaceMeshInFlight, a_merge_after_a_merge_stays_where_it_is) {
   Random random(11);
   const Pose a_pose = random.pose(0.1), b_pose = random.pose(0.1), c_pose = random.pose(0.1), later = random.pose(0.5);
-  InterfaceMesh a(voxel, 0.0), b(voxel, 0.0), c(voxel, 0.0);
   const Vec3 x(0.05, 0.02, 0.01), y(0.06, 0.02, 0.01), z(0.07, 0.02, 0.01);  // world
-  a.add({{a_pose.to_frame(x), 6 * voxel}});
-  b.add({{b_pose.to_frame(y), 6 * voxel}});
-  c.add({{c_pose.to_frame(z), 6 * voxel}});
-  a.set_pose(a_pose);
-  b.set_pose(b_pose);
-  c.set_pose(c_pose);
+  InterfaceMesh a = mesh_of({{a_pose.to_frame(x), 6 * voxel}}, voxel, 0.0, a_pose);
+  InterfaceMesh b = mesh_of({{b_pose.to_frame(y), 6 * voxel}}, voxel, 0.0, b_pose);
+  InterfaceMesh c = mesh_of({{c_pose.to_frame(z), 6 * voxel}}, voxel, 0.0, c_pose);
   b.merge(std::move(c));
   a.merge(std::move(b));
   for (const Vec3& centre : {x, y, z})
