@@ -310,23 +310,41 @@ class FileRefusals(Case):
 
     def test_bed_file_in_a_missing_folder(self):
         self.refused_by_fix(deck(FIX + " bed 10 missing/bed.*.vtp", "run 20"),
-                            f"keyword 'bed': cannot write missing/bed.10.vtp: {self.REASON}")
+                            f"keyword 'bed': cannot write missing/bed.*.vtp: {self.REASON}")
 
     def test_mesh_file_in_a_missing_folder(self):
         for ending in ("stl", "vtp", "vdb"):
             self.refused_by_fix(deck(f"{FIX} mesh 10 missing/mesh.*.{ending}", "run 20"),
-                                f"keyword 'mesh': cannot write missing/mesh.10.{ending}: {self.REASON}")
+                                f"keyword 'mesh': cannot write missing/mesh.*.{ending}: {self.REASON}")
 
     def test_all_ranks_stop_with_one_line(self):
         run = self.refused_by_fix(deck(FIX + " bed 10 missing/bed.vtp", "run 20"),
                                   f"keyword 'bed': cannot write missing/bed.vtp: {self.REASON}", ranks=2)
         self.assertNotIn("Segmentation", run.output)
 
+    def test_before_the_first_step(self):
+        run = self.refused_by_fix(deck(FIX + " bed 1000 missing/bed.*.vtp", "thermo 1", "run 2000"),
+                                  f"keyword 'bed': cannot write missing/bed.*.vtp: {self.REASON}")
+        self.assertNotIn("Step", run.log)
+
     def test_files_that_can_be_written_are(self):
         run = self.accepted(BLOCK + CULL_BLOCK + " bed 100 bed.*.vtp mesh 100 mesh.*.vdb\nrun 200\n")
-        for name in ("bed.100.vtp", "bed.200.vtp", "mesh.100.vdb", "mesh.200.vdb"):
+        for name in ("bed.0.vtp", "bed.100.vtp", "bed.200.vtp", "mesh.0.vdb", "mesh.100.vdb", "mesh.200.vdb"):
             self.assertIn(name, run.files)
         self.assertEqual([f for f in run.files if f.endswith(".part")], [])
+
+    def test_a_run_begins_with_a_file_where_it_is_due_as_with_a_dump(self):
+        outputs = " bed 100 bed.*.vtp\ndump d all custom 100 dump.* id\n"
+        run = self.accepted(BLOCK + CULL_BLOCK + outputs + "run 0\nrun 100\nrun 50\nrun 50\nreset_timestep 300\nrun 0\n")
+        written = {end: {int(f.split(".")[1]) for f in run.files if f.startswith(end)} for end in ("bed.", "dump.")}
+        self.assertEqual(written["bed."], {0, 100, 200, 300})
+        self.assertEqual(written["bed."], written["dump."])
+
+    def test_a_file_that_is_written_over_is_told_once(self):
+        run = self.accepted(BLOCK + CULL_BLOCK + " bed 100 bed.vtp mesh 100 mesh.*.vdb\nrun 200\nrun 100\n")
+        told = "keyword 'bed': bed.vtp has no '*' for the step in its name, and holds the last state only"
+        self.assertEqual(run.log.count(told), 1)
+        self.assertEqual(run.log.count("holds the last state only"), 1)
 
 
 class RegionRefusals(Case):
@@ -361,6 +379,46 @@ class RegionRefusals(Case):
 
     def test_no_fix_named(self):
         self.refused(deck(FIX, "region solid interface/mesh"), "region interface/mesh: give the ID of a fix solid/cull")
+
+    def test_move_and_rotate(self):
+        for words in ("move v_x NULL NULL", "rotate v_x 0 0 0 0 0 1"):
+            self.refused(deck(FIX, "variable x equal 0", f"region solid interface/mesh cull {words}"),
+                         "region interface/mesh: it moves with its bodies, and the keywords move and rotate would do nothing: "
+                         "leave them out")
+
+    REGIONS = ("region solid interface/mesh cull", "region half block INF INF INF INF INF 0.01 units box",
+               "region both intersect 2 half solid", "region one union 2 solid half", "region nested union 2 one half")
+
+    @staticmethod
+    def unknown_elsewhere(who, region):
+        return (f"{who}: region '{region}' is an interface/mesh or made of one, which each rank knows for its own granules and "
+                "which follows them: give a region of another style")
+
+    def test_fixes_that_ask_for_points_of_other_ranks(self):
+        distribution = ("fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0014",
+                        "fix dist all particledistribution/discrete 32452843 1 t1 1")
+        insert = "seed 32452867 distributiontemplate dist insert_every once particles_in_region 5 region"
+        for region in ("solid", "both", "one", "nested"):
+            self.refused(deck(FIX, *self.REGIONS, *distribution, f"fix ins all insert/pack {insert} {region}"),
+                         self.unknown_elsewhere("fix ins insert/pack", region))
+        rate = insert.replace("insert_every once", "insert_every 10 nparticles 10 particlerate 100")
+        for style, words in {"insert/rate/region": f"{rate} solid",
+                             "region/variable": "3 half solid half",
+                             "mesh/surface": "file floor.stl type 1 region solid",
+                             "ave/euler": "nevery 1 cell_size_relative 3 parallel yes basevolume_region solid"}.items():
+            self.refused(deck(FIX, *self.REGIONS, *distribution, f"fix ins all {style} {words}"),
+                         self.unknown_elsewhere(f"fix ins {style}", "solid"))
+
+    def test_random_places_on_several_ranks(self):
+        lines = deck(FIX, *self.REGIONS, "create_atoms 1 random 5 12345 both")
+        self.refused(lines, self.unknown_elsewhere("create_atoms random on several ranks", "both"), ranks=2)
+
+    def test_a_region_that_takes_the_place_of_one_made_of_meshes(self):
+        self.accepted(deck(FIX, *self.REGIONS, "region nested delete", "region other block 0 0.012 0 0.012 0.01 0.03 units box",
+                           "fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0014",
+                           "fix dist all particledistribution/discrete 32452843 1 t1 1",
+                           "fix ins all insert/pack seed 32452867 distributiontemplate dist insert_every once "
+                           "particles_in_region 2 region other", "run 1"))
 
     def test_reuse_of_a_name(self):
         self.refused(deck(FIX, "region box interface/mesh cull"), "Reuse of region ID")
