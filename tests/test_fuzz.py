@@ -72,6 +72,17 @@ class RandomDecks(unittest.TestCase):
                     verdict = fuzz.verdict_of(grammar.make(seed, more=False), Path(folder) / str(seed))
                     self.assertFalse(verdict.fails(), f"{verdict.kind}: {verdict.text}\ntests/fuzz/fuzz.py --plain --seed {seed} --count 1")
 
+    def test_sums_that_are_right_of_their_own_bed(self):
+        """A number that the fix changes when it restores is held against it, one that stays is not."""
+        head = [line.replace("processors 2 1 1", "processors * * *") for line in HEAD]
+        cull = CullLine([], keywords=["every", "10", "calm", "1", "speed", "0.5", "tolerance", "300", "0"])
+        sums = ["compute touches all contact/atom", "compute sum all reduce sum c_touches", "variable right equal c_sum", "variable wrong equal random(1,9,15485863)",
+                "thermo_style custom step atoms ke c_ke c_sum", "run 50", 'print "CHECK right contacts ${right}"', 'print "CHECK wrong contacts ${wrong}"']
+        deck = Deck(1, [1], [[Part(head, needed=True), cull, Part(["run 100"]), Part(sums), Part(["run 50"])]], set(), grammar.meshes(0.012, 0.012, 0.03, 5))
+        with tempfile.TemporaryDirectory(prefix="solidcull-fuzz-") as folder:
+            self.assertGreater(judge.run(deck, True, fuzz.LAUNCHER, Path(folder) / "whole").culled, 0)
+            for name, right in (("right", True), ("wrong", False), ("missing", False)):
+                self.assertEqual(judge.says_so_restored(deck, name, fuzz.LAUNCHER, Path(folder) / name), right, name)
 
     def test_decks_with_more_and_by_way_of_the_library(self):
         """And that stock is right about itself: what the judge would hold against the fix is then no fault of the fuzzer."""

@@ -108,7 +108,6 @@ void Culling::set_up_atoms() {
   if (other_walls) granules_may_change();
   take_changes(other_walls);
   p_.closure.begin_run(other_walls);
-  open_for_insertion();
   change();
   p_.closure.run_has_begun();
   walls_are_felt_ = !other_walls;
@@ -130,6 +129,7 @@ void Culling::initial_step() {
   take_loads();
   p_.gravity.begin_run();
   see_walls(true);
+  open_for_insertion(p_.ports.run.step);
   const std::int64_t step = p_.ports.run.step;
   if (p_.ports.ranks.any(p_.wake.any_here())) ask_for_build(step);
   p_.pacing.begin_run(step, p_.census.something_locked());
@@ -159,7 +159,6 @@ void Culling::take_neighbours() {
     take_arrivals();
   else
     p_.groups.forget_ghosts();
-  check_inserted();
   // the box followed the granules: stored ones go to the rank that has their place now, before anything comes near them
   if (p_.census.something_stored() && p_.ports.ranks.any(p_.ports.ranks.subdomain_changed()))
     p_.ports.run.ask_for_reneighbouring(p_.ports.run.step + 1);
@@ -220,7 +219,7 @@ void Culling::take_forces() {
     look();
     if (p_.ports.ranks.any(p_.wake.any_here())) ask_for_build(step + 1);
   }
-  if (p_.census.something_stored()) open_for_insertion();
+  open_for_insertion(step + 1);
 }
 
 /// What came out of the store because walls may be others feels them now, and goes back: there may be very many, and a look is
@@ -370,36 +369,26 @@ void Culling::take_changes(bool other_walls) {
 
 // ------------------------------------------------------------------------------------------------------------ insertion
 
-/// Fixes that insert check for overlap with atoms only: where they may put granules, stored ones become atoms first.
-void Culling::open_for_insertion() {
-  if (phase_ == Phase::beginning) {
-    open_for_insertion_ = open_for_insertion_ || p_.ports.insertions.any();
-  } else if (p_.ports.insertions.any_due(p_.ports.run.deck_step() + 2)) {
-    open_for_insertion_ = true;
-    p_.ports.run.ask_for_reneighbouring(p_.ports.run.step + 1);
-  }
+/// Fixes that insert check for overlap with atoms only: where they put granules, stored ones become atoms in the change at this
+/// step, the one before, so that ranks see each other's.
+void Culling::open_for_insertion(std::int64_t step) {
+  if (p_.census.something_stored() && p_.ports.insertions.any_due(step + 1 + p_.ports.run.reset_by))
+    p_.ports.run.ask_for_reneighbouring(step);
 }
 
-void Culling::check_inserted() {
-  if (!p_.ports.insertions.has_inserted() || !p_.census.something_stored()) return;
-  const Atoms& atoms = p_.ports.atoms;
-  std::int64_t overlapping = 0;
-  bool near = false;
-  for (int i = 0; i < atoms.owned + atoms.ghosts; ++i) {
-    if (atoms.is_interface(i)) continue;
-    const Sphere s = atoms.sphere(i);
-    p_.stored.for_each_near(s, p_.ports.run.skin, [&](const Resident& g) {
-      near = true;
-      if ((p_.solid.nearest_image(p_.solid.in_world(g), s.centre) - s.centre).norm() < g.radius + s.radius)
-        overlapping = atoms.tag[i];
-    });
+/// What was made inside a stored granule cannot stay. Stored ones come back for each fix that inserts, so nothing that LIGGGHTS
+/// does is known to come here; but between runs a deck may make granules anywhere, and fixes need not look for overlap. What was
+/// culled there wakes before the first force: a blow is shared by two. Before anything comes out of the store.
+void Culling::meet_new_granules() {
+  if (p_.census.something_locked()) {
+    const ShellClosure::Overlapped found = p_.closure.by_new_granules();
+    if (found.in_stored && phase_ == Phase::stepping)
+      throw InputError("granule " + std::to_string(found.in_stored) +
+                       " was inserted into the place of a culled one: give the insertion a region above the bed, or unfix " +
+                       p_.ports.run.name + " first");
+    for (const Vec3& place : found.places) p_.wake.ask(place, p_.scales.wake_up().largest_radius());
   }
-  p_.ports.ranks.largest(&overlapping, 1);
-  if (overlapping)
-    throw InputError(
-        "granule " + std::to_string(overlapping) +
-        " was inserted into the place of a culled one: give the insertion a region above the bed, or unfix solid/cull first");
-  if (p_.ports.ranks.any(near)) p_.ports.run.ask_for_reneighbouring(p_.ports.run.step + 1);
+  p_.closure.forget_new();
 }
 
 // ------------------------------------------------------------------------------------------------------------ state

@@ -83,6 +83,7 @@ class Culling {
   // --- what follows the engine's atoms; local
   const std::vector<FollowsAtoms*>& followers() { return p_.followers; }
   void arrived_from_another_rank(int i) { p_.shell.is_arriving(i); }
+  void was_made(int i) { p_.closure.was_made(i); }  ///< by a fix that inserts, or any other way
   void read_from_file(int i) { p_.cover.forget(i); }
   double* labels() { return p_.shell.labels(); }
 
@@ -113,8 +114,8 @@ class Culling {
   void ground_and_press();
   void judge(bool may_cull, const Proposal& proposal);
   void ask_for_build(std::int64_t step);
-  void open_for_insertion();
-  void check_inserted();
+  void open_for_insertion(std::int64_t step);
+  void meet_new_granules();
   void close_shell(bool changes, bool& shell_changed);
   void refill(bool& shell_changed);
   void store_and_fetch(const MembershipChange& c, bool changes, bool& shell_changed);
@@ -129,7 +130,6 @@ class Culling {
   bool proposal_dropped_ = false;
   std::uint64_t granules_sum_ = 0;   // see remember_granules()
   bool inner_pairs_listed_ = false;  // the neighbour lists are new: pairs within bodies stand in them
-  bool open_for_insertion_ = false;  // a fix will insert: stored granules must make way in the next change
   bool told_of_file_ = false;        // that restart files of this run hold more than atoms
   bool bodies_are_fast_ = false;     // some body may come too far between two times when ranks talk
   std::int64_t restored_then_ = 0;   // granules restored on this rank until culling was judged last

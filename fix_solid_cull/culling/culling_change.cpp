@@ -28,18 +28,16 @@ void Culling::change() {
   check_numbers(p_.ports.atoms);  // before they are sorted into cells, here and by the engine
   if (!p_.solid.has_store()) return;
   const auto timed = p_.report.time(Part::membership);
+  meet_new_granules();
   follow_box();
   // another fix may have deleted granules in this hook
   if (phase_ == Phase::stepping && p_.census.something_locked() && p_.lost.forget_lost()) settle_bodies();
   p_.ports.memory.freed(p_.exchange.begin_change());
-  if (!p_.census.something_locked() && !p_.ports.ranks.any(proposal_.any_here() || p_.wake.any_at_all())) {
-    open_for_insertion_ = false;  // nothing is culled, and nothing is to be
-    return;
-  }
+  if (!p_.census.something_locked() && !p_.ports.ranks.any(proposal_.any_here() || p_.wake.any_at_all())) return;
   if (phase_ == Phase::stepping) p_.ports.memory.make_room(proposal_.chosen.size());
   p_.refill.begin_change();
   MembershipChange c(p_.for_change(), p_.wake.take(p_.ports.ranks, p_.scales.wake_up()), proposal_.take());
-  const bool changes = p_.ports.ranks.any(c.any_here() || p_.grounding.lets_go() || open_for_insertion_);
+  const bool changes = p_.ports.ranks.any(c.any_here() || p_.grounding.lets_go());
   bool shell_changed = false;
   p_.grounding.let_go();
   if (changes || p_.ports.ranks.count > 1) p_.index.index(p_.ports.atoms);
@@ -67,7 +65,6 @@ void Culling::change() {
   follow_box();  // places of stored granules are rounded: the last digit of a border decides who owns what lies on it
   if (p_.handover.send_home()) count_restored();
   p_.lost.remember();
-  open_for_insertion_ = false;
   fit_memory();
   p_.motion.is_stale();
   p_.motion.refresh();
@@ -79,7 +76,7 @@ void Culling::change() {
 void Culling::close_shell(bool changes, bool& shell_changed) {
   const auto timed = p_.report.time(Part::shell);
   if (changes || p_.census.something_stored()) p_.closure.share();
-  if (p_.census.something_stored()) shell_changed |= p_.closure.fetch_what_is_near(open_for_insertion_) > 0;
+  if (p_.census.something_stored()) shell_changed |= p_.closure.fetch_what_is_near() > 0;
 }
 
 /// What came out of a store that knows no places is packed; what it comes near to by that comes out, too.

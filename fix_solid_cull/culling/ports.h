@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "box.h"
 #include "frozen_wall_loads.h"
 #include "internal_error.h"
 #include "sphere.h"
@@ -25,11 +26,6 @@ inline void set(double* to, const Vec3& v) {
 using Triple = std::array<double, 3>;
 inline Triple triple(const Vec3& v) { return {v[0], v[1], v[2]}; }
 inline Vec3 vec(const Triple& t) { return vec(t.data()); }
-
-/// An axis-aligned box (m).
-struct Box {
-  Vec3 lo = Vec3::Zero(), hi = Vec3::Zero();
-};
 
 /// The granules that are atoms in the engine, as views of its arrays: the owned ones first, then ghosts. Views hold for one hook;
 /// take_out() and put_back() renew them. Local, but for publish_counts().
@@ -65,8 +61,18 @@ class Atoms {
   Sphere sphere(int i) const { return {place(i), radius[i]}; }
   bool is_interface(int i) const { return (groups[i] & interface_bit) != 0; }
   void mark_interface(int i, bool on) { on ? groups[i] |= interface_bit : groups[i] &= ~interface_bit; }
+  /// Fixes may move granules along ways of their own for some time.
+  struct Ways {
+    const double* until =
+        nullptr;  ///< the last step at which a granule is moved so, every `stride` numbers; nullptr: no fix does
+    int stride = 0;
+    double step = 0;  ///< this one
+    bool hold(int i) const { return until && until[std::size_t(stride) * std::size_t(i)] >= step; }
+  };
+  Ways ways;
+
   /// An integrator moves it, all the gravity there is pulls it, and nothing else holds or drives it.
-  bool may_be_culled(int i) const { return groups_may_be_culled(groups[i]); }
+  bool may_be_culled(int i) const { return groups_may_be_culled(groups[i]) && !ways.hold(i); }
   bool groups_may_be_culled(int g) const {
     return (g & own_bit) && (g & movable_bits) && !(g & held_bits) && (g & gravity_bits) == gravity_bits;
   }
@@ -210,11 +216,10 @@ class Walls {
 class Insertions {
  public:
   virtual ~Insertions() = default;
-  virtual bool any() const = 0;
-  virtual bool any_due(std::int64_t step) const = 0;  ///< at that step
-  /// Boxes around their regions, `margin` larger on each side; of those due at this step or the next only, if `soon`.
-  virtual std::vector<Box> boxes(bool soon, double margin) const = 0;
-  virtual bool has_inserted() const = 0;  ///< in this reneighbouring
+  virtual bool any_due(std::int64_t step) const = 0;  ///< at that step of the deck
+  /// Of what is to be inserted at this step or the next: boxes that hold the centre of each granule, `largest` (m) in radius at
+  /// most, that could touch what comes, or that the fix counts.
+  virtual std::vector<Box> due_boxes(double largest) const = 0;
   /// Boxes around meshes that count the atoms that pass, `margin` larger on each side: what is in them must be atoms.
   virtual std::vector<Box> counting(double margin) const = 0;
 };

@@ -62,6 +62,42 @@ void ShellClosure::share() {
   for (const Row& r : ports_.ranks.exchange(rows, reach)) foreign_.push_back({{vec(r.at), r.radius}, r.body, r.stands});
 }
 
+ShellClosure::Overlapped ShellClosure::by_new_granules() const {
+  Overlapped found;
+  if (!ports_.ranks.any(some_made_)) return found;
+  struct Row {
+    Triple at;
+    double radius;
+    std::int64_t tag;
+  };
+  const Atoms& atoms = ports_.atoms;
+  std::vector<Row> rows;
+  for (int i = 0; some_made_ && i < atoms.owned; ++i)
+    if (rows_[i].made) rows.push_back({triple(atoms.place(i)), atoms.radius[i], atoms.tag[i]});
+  const std::vector<Row> others = ports_.ranks.exchange(rows, contact_reach(ports_, solid_) + stored_.slack());
+  rows.insert(rows.end(), others.begin(), others.end());
+  std::vector<Sphere> made;
+  for (const Row& r : rows) {
+    made.push_back({vec(r.at), r.radius});
+    stored_.for_each_near(made.back(), 0, [&](const Resident& g) {
+      found.in_stored = r.tag;
+      found.places.push_back(solid_.in_world(g));
+    });
+  }
+  SphereCells cells;
+  cells.build(std::move(made), 2 * scales_.diameter());
+  for (int i = 0; i < atoms.owned; ++i)
+    if (shell_.locked(i) && cells.any_near(atoms.sphere(i), 0)) found.places.push_back(atoms.place(i));
+  ports_.ranks.largest(&found.in_stored, 1);
+  return found;
+}
+
+void ShellClosure::forget_new() {
+  if (!some_made_) return;
+  some_made_ = false;
+  for (int i = 0; i < ports_.atoms.owned; ++i) rows_[i].made = false;
+}
+
 /// Nothing that is stored in a frame that stands was within store_gap_in_skins of it when it was last looked at; since then it
 /// has hardly moved, and only what is as far from all exterior granules went to the store.
 bool ShellClosure::is_clear(int i) const {
@@ -177,7 +213,7 @@ void ShellClosure::find_near_granules(std::set<std::int64_t>& near) {
       });
   }
   for (const Visitor& v : all)
-    if (v.atom >= 0 && !v.clear) rows_[v.atom] = {solid_.standing_version(), v.who.sphere.centre};
+    if (v.atom >= 0 && !v.clear) rows_[v.atom] = {solid_.standing_version(), false, v.who.sphere.centre};
 }
 
 /// Walls and bodies are compared when they have moved against each other since the last time, and at the start of a run.
@@ -235,18 +271,22 @@ void ShellClosure::find_near_primitives(const std::vector<int>& frames, std::set
   });
 }
 
-std::size_t ShellClosure::fetch_what_is_near(bool open_for_insertion) {
+std::size_t ShellClosure::fetch_what_is_near() {
   std::set<std::int64_t> near;
   find_near_granules(near);
   find_near_walls(near);
-  const auto open = [&](const std::vector<Box>& boxes) {
-    for (const Box& box : boxes) stored_.for_each_in_box(box.lo, box.hi, [&](const Resident& g) { near.insert(g.tag); });
-  };
-  const double margin = solid_.store().largest_radius() + ports_.run.skin;
-  if (open_for_insertion) open(ports_.insertions.boxes(false, margin));
-  open(ports_.insertions.counting(margin));
+  for (const Box& box : opened(ports_.run.skin))
+    stored_.for_each_in_box(box.lo, box.hi, [&](const Resident& g) { near.insert(g.tag); });
   for (const std::int64_t tag : near) exchange_.bring_back(tag);
   return near.size();
+}
+
+/// Where everything is to be an atom, whatever is near: `gap` wider than it must be.
+std::vector<Box> ShellClosure::opened(double gap) const {
+  const double largest = solid_.store().largest_radius();
+  std::vector<Box> all = ports_.insertions.counting(largest + gap);
+  for (const Box& box : ports_.insertions.due_boxes(largest)) all.push_back(box.grown_by(gap));
+  return all;
 }
 
 std::size_t ShellClosure::fetch_from_outside() {
@@ -335,10 +375,7 @@ class ShellClosure::Surroundings {
     exterior_.build(std::move(exterior), 2 * c.scales_.diameter());
     shells_.build(std::move(shells), 2 * c.scales_.diameter());
     if (several) find_others();
-    // what is to be inserted at this step or the next must find the bed open
-    opened_ = c.ports_.insertions.boxes(true, c.solid_.store().largest_radius() + c.ports_.run.skin);
-    const std::vector<Box> counting = c.ports_.insertions.counting(c.solid_.store().largest_radius() + gap_);
-    opened_.insert(opened_.end(), counting.begin(), counting.end());
+    opened_ = c.opened(gap_);
   }
   bool near(int i) const { return near(i, c_.ports_.atoms.sphere(i)); }
   /// The same if atom i was there.
@@ -373,9 +410,7 @@ class ShellClosure::Surroundings {
     small_others_.build(std::move(small), 2 * c_.scales_.diameter());
   }
   bool is_open(const Vec3& x) const {
-    return std::any_of(opened_.begin(), opened_.end(), [&](const Box& box) {
-      return (x.array() >= box.lo.array()).all() && (x.array() <= box.hi.array()).all();
-    });
+    return std::any_of(opened_.begin(), opened_.end(), [&](const Box& box) { return box.holds(x); });
   }
   bool near_another_body(int i, const Sphere& s) const {
     if (!c_.census_.several_bodies()) return false;

@@ -23,6 +23,7 @@ namespace solidcull {
 /// When nothing stored was near an exterior granule.
 struct Cleared {
   int version = never;     ///< of what stands in the store
+  bool made = false;       ///< since the last membership change: it may be anywhere
   Vec3 at = Vec3::Zero();  ///< where it was then (m)
   static constexpr int never = -1;
 
@@ -48,15 +49,25 @@ class ShellClosure : public BodyFollower {
   PerGranule<Cleared>& rows() { return rows_; }
   void unlocked(int i) { rows_[i].version = Cleared::never; }
 
+  // --- granules that were made since the last membership change
+  void was_made(int i) { rows_[i].made = some_made_ = true; }  ///< local
+  struct Overlapped {
+    std::int64_t in_stored = 0;  ///< tag of a new granule that overlaps a stored one; 0: none does. On all ranks
+    std::vector<Vec3> places;    ///< of the culled granules of this rank that new ones overlap
+  };
+  /// Collective.
+  Overlapped by_new_granules() const;
+  void forget_new();  ///< local
+
   /// A run begins: walls may be others, and stored granules at them are atoms until they are seen to rest.
   void begin_run(bool other_walls) { new_run_ = other_walls; }
   void run_has_begun() { new_run_ = false; }
 
   /// Ranks tell each other what they have that is exterior, or the shell of another body. Collective.
   void share();
-  /// Whatever comes near stored granules makes them atoms; so does an insertion if `open_for_insertion`. Returns how many came
+  /// Whatever comes near stored granules makes them atoms; so does an insertion at this step or the next. Returns how many came
   /// back. Local, after share().
-  std::size_t fetch_what_is_near(bool open_for_insertion);
+  std::size_t fetch_what_is_near();
   /// What would leave the box becomes an atom, and the engine does with it what it does with any that leaves. Local.
   std::size_t fetch_from_outside();
   /// What nothing is near any more goes to the store: what was just locked (`locked_now`) and what the looks ask for at once,
@@ -97,6 +108,7 @@ class ShellClosure : public BodyFollower {
   Foreign as_foreign(int i) const;
   bool is_clear(int i) const;
   std::vector<Visitor> visitors(const Frames& frames) const;
+  std::vector<Box> opened(double gap) const;
   void find_near_granules(std::set<std::int64_t>& near);
   void find_near_walls(std::set<std::int64_t>& near);
   void find_near_primitives(const std::vector<int>& frames, std::set<std::int64_t>& near) const;
@@ -117,6 +129,7 @@ class ShellClosure : public BodyFollower {
   PerGranule<Cleared> rows_;
   std::vector<Foreign> foreign_;         // other ranks' and periodic images'
   std::map<int, SeenWalls> seen_walls_;  // when frames of the store were last compared with walls
+  bool some_made_ = false;               // on this rank
   bool new_run_ = false;
   bool store_asked_ = false;        // a look saw interface granules that nothing holds any more
   int builds_without_storing_ = 0;  // since they were last looked for

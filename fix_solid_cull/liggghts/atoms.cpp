@@ -3,12 +3,14 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <cstring>
 
 #include "atom.h"
 #include "domain.h"
 #include "engine_access.h"
 #include "group.h"
 #include "irregular.h"
+#include "modify.h"
 #include "output.h"
 #include "update.h"
 
@@ -32,7 +34,21 @@ void EngineAtoms::renew() {
   type = atom->type;
   groups = atom->mask;
   own_bit = own_->groupbit;
+  find_ways();
 }
+
+/// Granules of fix insert/stream come out of their face one by one.
+void EngineAtoms::find_ways() {
+  ways = {};
+  if (releases_ < 0) return;
+  if (releases_ >= modify->nfix || std::strcmp(modify->fix[releases_]->id, releases_id) != 0) connect();
+  if (releases_ < 0 || !modify->fix[releases_]->array_atom) return;
+  constexpr int step_of_release = 4;
+  const LAMMPS_NS::Fix* fix = modify->fix[releases_];
+  ways = {fix->array_atom[0] + step_of_release, fix->size_peratom_cols, static_cast<double>(update->ntimestep)};
+}
+
+void EngineAtoms::connect() { releases_ = modify->find_fix(releases_id); }
 
 bool EngineAtoms::make_interface_group() {
   const std::string name = std::string(own_->id) + "_interface";
@@ -74,7 +90,9 @@ int EngineAtoms::groups_of(const std::vector<double>& record, int layout) {
 
 int EngineAtoms::put_back(const std::vector<double>& record, int layout) {
   clear_map();
+  puts_back_ = true;
   const int i = records_.append(record, layout);
+  puts_back_ = false;
   renew();
   return i;
 }

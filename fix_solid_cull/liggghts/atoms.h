@@ -12,6 +12,9 @@
 
 namespace solidcull {
 
+/// The ID of the fix that keeps when granules of fix insert/stream are released.
+constexpr const char* releases_id = "release_fix_insert_stream";
+
 class EngineAtoms : public Atoms, protected LAMMPS_NS::Pointers {
  public:
   /// own: the culling's fix, whose group and per-atom arrays are its own matter.
@@ -19,6 +22,10 @@ class EngineAtoms : public Atoms, protected LAMMPS_NS::Pointers {
 
   /// The engine's arrays may be others: reads them anew. At each hook. Local.
   void renew();
+  /// A run begins: fixes may be others. Local.
+  void connect();
+  /// An atom that is made now comes out of a record.
+  bool puts_back() const { return puts_back_; }
   /// Makes the group of interface granules, unless it is there. False if all groups are taken.
   bool make_interface_group();
 
@@ -40,11 +47,14 @@ class EngineAtoms : public Atoms, protected LAMMPS_NS::Pointers {
 
  private:
   void clear_map();
+  void find_ways();
 
   const LAMMPS_NS::Fix* own_;
   GranuleRecords records_;
   bool map_cleared_ = false;
   int groups_word_ = -1;  // of a record; unknown at first
+  int releases_ = -1;     // number of the fix that holds when granules are released; -1: none
+  bool puts_back_ = false;
 };
 
 }  // namespace solidcull

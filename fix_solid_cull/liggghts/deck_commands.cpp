@@ -106,6 +106,9 @@ MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, 
   FixSolidCull* fix = fix_of(lmp);
   const std::vector<std::string> line(words, words + n);
   Sight sight = sight_of(command, line, added);
+  resets_ = std::strcmp(command, "reset_timestep") == 0;
+  // fix insert/stream then moves the step at which each granule was released
+  if (resets_ && lmp->modify->find_fix(releases_id) >= 0) sight = Sight::whole_bed;
   if (is_own_line(command, words, n)) sight = fix ? Sight::all_restored : Sight::nothing;
   const std::string refused = why_no_interface_mesh_for_command(lmp, command, n, words);
   if (!refused.empty()) lmp->error->all(FLERR, refused.c_str());
@@ -125,7 +128,6 @@ MetCommand::MetCommand(LAMMPS_NS::LAMMPS* lmp, const char* command, bool added, 
   if (n == 1 && std::strcmp(command, "read_restart") == 0) remember_read(lmp, words[0]);
   histories_stay = lists_are_void(lmp) && std::strcmp(command, "delete_atoms") == 0;
   step_ = lmp->update->ntimestep;
-  resets_ = std::strcmp(command, "reset_timestep") == 0;
 }
 
 MetCommand::~MetCommand() {

@@ -1,19 +1,22 @@
 #include "deck_rules.h"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
+#include <vector>
 
 #include "atom.h"
 #include "compute.h"
 #include "compute_styles.h"
 #include "domain.h"
 #include "engine_access.h"
-#include "fix_insert.h"
+#include "fix_insert_pack.h"
 #include "fix_styles.h"
 #include "force.h"
 #include "input_error.h"
 #include "modify.h"
 #include "pair_gran.h"
+#include "region.h"
 #include "snapshot.h"
 #include "update.h"
 
@@ -86,6 +89,15 @@ void DeckRules::refuse_what_cannot_be_culled() const {
   refuse_measures_of_other_physics();
 }
 
+bool DeckRules::fills_solid_bodies(const LAMMPS_NS::Fix* fix) const {
+  const auto* pack = dynamic_cast<const LAMMPS_NS::FixInsertPack*>(fix);
+  const LAMMPS_NS::Region* region = pack ? engine::insertion_region(*pack) : nullptr;
+  if (!region) return false;
+  const std::vector<const LAMMPS_NS::Region*> parts = engine::parts_of(region, *domain);
+  return std::any_of(parts.begin(), parts.end(),
+                     [](const LAMMPS_NS::Region* part) { return std::strcmp(part->style, "interface/mesh") == 0; });
+}
+
 void DeckRules::refuse_measures_of_other_physics() const {
   for (int c = 0; c < modify->ncompute; ++c) {
     const ComputeStyle& style = measure_of(modify->compute[c]->style);
@@ -105,6 +117,10 @@ void DeckRules::refuse_physics_that_would_miss_granules() const {
     const auto* insertion = dynamic_cast<const LAMMPS_NS::FixInsert*>(fix);
     if (insertion && engine::compresses_tags(*insertion))
       refuse(name + "compress_tags would renumber granules that are culled; say 'compress_tags no'");
+    if (fills_solid_bodies(fix))
+      refuse(name +
+             "a region interface/mesh changes while the deck runs, and each rank knows its own part; give the insertion a " +
+             "region that stands, it finds room by the granules there");
   }
 }
 

@@ -24,6 +24,7 @@ class DeckRules : protected LAMMPS_NS::Pointers {
  private:
   void refuse_physics_that_would_miss_granules() const;
   void refuse_measures_of_other_physics() const;
+  bool fills_solid_bodies(const LAMMPS_NS::Fix* fix) const;
   void say_what_sees_atoms_only(const Run& run);
   void say_once(const Run& run, const std::string& line);
 

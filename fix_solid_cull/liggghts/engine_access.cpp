@@ -9,15 +9,19 @@
 #include <cstdlib>
 
 #include "atom.h"
+#include "domain.h"
 #include "fix.h"
 #include "fix_contact_history.h"
 #include "fix_insert.h"
 #include "fix_insert_pack.h"
+#include "fix_insert_stream.h"
 #include "fix_massflow_mesh.h"
 #include "memory.h"
 #include "modify.h"
 #include "neigh_list.h"
 #include "neighbor.h"
+#include "region_intersect.h"
+#include "region_union.h"
 #include "thermo.h"
 
 namespace solidcull::engine {
@@ -46,6 +50,17 @@ SOLIDCULL_EXPOSE(HistoryPartners, FixContactHistory, int**, partner_)
 SOLIDCULL_EXPOSE(HistoryNumbers, FixContactHistory, double**, contacthistory_)
 SOLIDCULL_EXPOSE(InsertCompress, FixInsert, bool, compress_flag)
 SOLIDCULL_EXPOSE(PackRegion, FixInsertPack, LAMMPS_NS::Region*, ins_region)
+using Three = double[3];
+SOLIDCULL_EXPOSE(InsertVelocity, FixInsert, Three, v_insert)
+SOLIDCULL_EXPOSE(StreamLength, FixInsertStream, double, extrude_length)
+SOLIDCULL_EXPOSE(StreamOffset, FixInsertStream, double, extrude_length_min)
+SOLIDCULL_EXPOSE(StreamDuration, FixInsertStream, int, duration)
+SOLIDCULL_EXPOSE(UnionParts, RegUnion, int*, list)
+SOLIDCULL_EXPOSE(UnionCount, RegUnion, int, nregion)
+SOLIDCULL_EXPOSE(IntersectParts, RegIntersect, int*, list)
+SOLIDCULL_EXPOSE(IntersectCount, RegIntersect, int, nregion)
+SOLIDCULL_EXPOSE(BeforeExchange, Modify, int*, list_pre_exchange)
+SOLIDCULL_EXPOSE(BeforeExchangeCount, Modify, int, n_pre_exchange)
 SOLIDCULL_EXPOSE(CountingMesh, FixMassflowMesh, LAMMPS_NS::FixMeshSurface*, fix_mesh_)
 SOLIDCULL_EXPOSE(ThermoAtoms, Thermo, LAMMPS_NS::bigint, last_natoms)
 SOLIDCULL_EXPOSE(HistoryIntPages, FixContactHistory, LAMMPS_NS::MyPage<int>*, ipage_)
@@ -100,9 +115,35 @@ void expect_atoms(LAMMPS_NS::Thermo& thermo, long change) {
   if (last > 0) last += change;  // 0 from the start of a run to its first output
 }
 
-const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::Fix* fix) {
-  const auto* pack = dynamic_cast<const LAMMPS_NS::FixInsertPack*>(fix);
-  return pack ? pack->*member(PackRegion()) : nullptr;
+const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::FixInsertPack& fix) { return fix.*member(PackRegion()); }
+
+Stream stream_of(const LAMMPS_NS::FixInsertStream& fix) {
+  const double* const v = fix.*member(InsertVelocity());
+  return {Vec3(v[0], v[1], v[2]), fix.*member(StreamLength()), fix.*member(StreamOffset()), fix.*member(StreamDuration())};
+}
+
+std::vector<const LAMMPS_NS::Region*> parts_of(const LAMMPS_NS::Region* region, const LAMMPS_NS::Domain& domain) {
+  const int *list = nullptr, *end = nullptr;
+  if (const auto* united = dynamic_cast<const LAMMPS_NS::RegUnion*>(region)) {
+    list = united->*member(UnionParts());
+    end = list + united->*member(UnionCount());
+  } else if (const auto* common = dynamic_cast<const LAMMPS_NS::RegIntersect*>(region)) {
+    list = common->*member(IntersectParts());
+    end = list + common->*member(IntersectCount());
+  } else {
+    return {region};
+  }
+  std::vector<const LAMMPS_NS::Region*> all;
+  for (; list != end; ++list)
+    for (const LAMMPS_NS::Region* part : parts_of(domain.regions[*list], domain)) all.push_back(part);
+  return all;
+}
+
+void act_last_before_exchange(LAMMPS_NS::Modify& modify, const LAMMPS_NS::Fix* fix) {
+  int* const list = modify.*member(BeforeExchange());
+  int* const end = list + modify.*member(BeforeExchangeCount());
+  int* const own = std::find_if(list, end, [&](int f) { return modify.fix[f] == fix; });
+  if (own != end) std::rotate(own, own + 1, end);
 }
 
 LAMMPS_NS::FixMeshSurface* counting_mesh(const LAMMPS_NS::Fix* fix) {

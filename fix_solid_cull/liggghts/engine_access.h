@@ -6,12 +6,16 @@
 #include <vector>
 
 #include "interposed.h"
+#include "pose.h"
 
 namespace LAMMPS_NS {
 class Atom;
+class Domain;
 class Fix;
 class FixContactHistory;
 class FixInsert;
+class FixInsertPack;
+class FixInsertStream;
 class FixMeshSurface;
 class LAMMPS;
 class Memory;
@@ -82,6 +86,17 @@ void set_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_
 /// How many bins the neighbour build has on this rank.
 int neighbor_bins(const LAMMPS_NS::Neighbor& neighbor);
 /// The region that an insert/pack or insert/rate fix fills.
-const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::Fix* fix);
+const LAMMPS_NS::Region* insertion_region(const LAMMPS_NS::FixInsertPack& fix);
+/// How a fix insert/stream puts granules behind its face.
+struct Stream {
+  Vec3 velocity;          ///< m/s
+  double length, offset;  ///< so far behind it, and a little more where it inserts in parallel (m); 0 until they are known
+  int duration;           ///< steps for which granules move with it; 0: until the next are inserted
+};
+Stream stream_of(const LAMMPS_NS::FixInsertStream& fix);
+/// Regions that a union or an intersection is made of, all the way down; the region itself, if it is neither.
+std::vector<const LAMMPS_NS::Region*> parts_of(const LAMMPS_NS::Region* region, const LAMMPS_NS::Domain& domain);
+/// The fix does its work before the exchange of atoms when all others have done theirs. Until lists of fixes are made anew.
+void act_last_before_exchange(LAMMPS_NS::Modify& modify, const LAMMPS_NS::Fix* fix);
 
 }  // namespace solidcull::engine

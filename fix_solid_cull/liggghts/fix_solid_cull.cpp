@@ -11,10 +11,12 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "engine_access.h"
 #include "error.h"
 #include "input_error.h"
 #include "interpositions.h"
 #include "mesh_regions.h"
+#include "modify.h"
 #include "restart_files.h"
 #include "run_failure.h"
 #include "settings.h"
@@ -45,7 +47,7 @@ FixSolidCull::FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
   }
   publish_flags();
   grow_arrays(atom->nmax);
-  for (int i = 0; i < atom->nmax; ++i) set_arrays(i);
+  for (int i = 0; i < atom->nmax; ++i) reset_rows(i);
   atom->add_callback(0);
   atom->add_callback(1);
   set_geometry_threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / comm->nprocs));
@@ -139,6 +141,7 @@ auto FixSolidCull::hand_on(Work work) -> decltype(work()) {
 void FixSolidCull::init() {
   hand_on([&] {
     rules_.refuse_what_cannot_be_culled();
+    engine::act_last_before_exchange(*modify, this);  // what others insert or delete there is seen at once
     contacts_.connect();
     walls_.connect();
     if (waits_for_run()) rules_.find_movable(atoms_, run_);  // write_restart takes up what a file holds, without a run
@@ -214,6 +217,7 @@ void FixSolidCull::pre_delete(bool unfix) {
 // ------------------------------------------------------------------------------------------------------------ between runs
 
 void FixSolidCull::run_begins() {
+  atoms_.connect();
   hand_on([&] {
     if (rules_.find_movable(atoms_, run_)) culling_->show_bed();  // to see who may still be culled
     culling_->hide_bed();
@@ -346,9 +350,14 @@ void FixSolidCull::copy_arrays(int from, int to, int) {
   });
 }
 
+void FixSolidCull::reset_rows(int i) {
+  for (FollowsAtoms* f : culling_->followers()) f->reset(i);
+}
+
 void FixSolidCull::set_arrays(int i) {
   guarded([&] {
-    for (FollowsAtoms* f : culling_->followers()) f->reset(i);
+    reset_rows(i);
+    if (!atoms_.puts_back()) culling_->was_made(i);
   });
 }
 

@@ -102,6 +102,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   template <class Work>
   auto hand_on(Work work) -> decltype(work());
   void renew();
+  void reset_rows(int i);
   std::string line(const std::string& what) const;
   void refuse(const std::string& why);   // the user's fault; collective
   void broken(const std::string& what);  // ours; local

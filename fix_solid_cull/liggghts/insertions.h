@@ -12,10 +12,8 @@ class EngineInsertions : public Insertions, protected LAMMPS_NS::Pointers {
  public:
   explicit EngineInsertions(LAMMPS_NS::LAMMPS* lmp) : Pointers(lmp) {}
 
-  bool any() const override;
   bool any_due(std::int64_t step) const override;
-  std::vector<Box> boxes(bool soon, double margin) const override;
-  bool has_inserted() const override;
+  std::vector<Box> due_boxes(double largest) const override;
   std::vector<Box> counting(double margin) const override;
 };
 

@@ -43,3 +43,14 @@ class Deck:
         made = copy.copy(self)
         made.files = [[p for p in parts if not any(p is d for d in dropped)] for parts in self.files]
         return made
+
+    def up_to(self, line, more):
+        """The deck that ends with the line that begins so, and with lines that follow it; None where there is none."""
+        for f, parts in enumerate(self.files):
+            for p, part in enumerate(parts):
+                for n, there in enumerate(part.lines):
+                    if there.startswith(line):
+                        made = copy.copy(self)
+                        made.files = [*self.files[:f], [*parts[:p], Part([*part.lines[:n + 1], *more])]]
+                        return made
+        return None

@@ -18,7 +18,8 @@ HEIGHT = 0.5         # d: mean heights of two runs at rest may differ by so much
 WEIGHT = 0.1         # of the weight: loads on the floor of two runs at rest
 SLACK = (5, 0.05)    # granules and share: counts that hang on chance
 CONTACTS = 0.25      # share: numbers of contacts of two runs
-LOADS = (1e-9, 0.7)  # and share: sums of stresses (J) or of forces (N) over contacts
+RESTORED = {"contacts": 0.0, "load": 0.1}  # share: of the same granules; forces hang on speeds, which a set-up takes half a step later
+LOADS = (1e-9, 0.7)  # and share: sums of stresses (J) or of overlaps (m) over contacts
 DRIVER = Path(__file__).resolve().parent / "driver.py"
 
 # the plug-in may refuse these; anything else that it refuses is to be looked at
@@ -165,6 +166,20 @@ def differs(kind, got, value):
         return value > 1 and apart(got, value)
     slack, share = LOADS if kind == "load" else (SLACK[0], CONTACTS)
     return not abs(got - value) <= max(slack, share * max(abs(got), abs(value)))
+
+
+def says_so_restored(deck, name, program, folder):
+    """Whether a sum over contacts that our run printed is that of its bed when all is restored right there."""
+    for kind, share in RESTORED.items():
+        line = f'print "CHECK {name} {kind} '
+        short = deck.up_to(line, ["unfix cull", "run 0", f'print "CHECK {name}_restored {kind} ${{{name}}}"'])
+        if short:
+            end = run(short, True, program, folder)
+            if end.late or not all(n in end.checks for n in (name, f"{name}_restored")):
+                return False
+            (_, told), (_, restored) = end.checks[name], end.checks[f"{name}_restored"]
+            return abs(told - restored) <= max(LOADS[0], share * max(abs(told), abs(restored)))
+    return False
 
 
 def whole(end):

@@ -36,7 +36,7 @@ class MoreEvents:
         if not again:
             self.local = self.rng.choice((None, None, "pair/gran/local", "wall/gran/local" if self.meshes else "pair/gran/local"))
         if self.local:
-            self.say(f"compute local all {self.local} force_normal", "compute pressed all reduce sum c_local[3]")
+            self.say(f"compute local all {self.local} contactArea delta", "compute overlap all reduce sum c_local[2]")  # a force has the sign of the order of a pair
 
     def contacts(self):
         """A sum over contacts that the deck prints at the end of a run, and goes by."""
@@ -45,7 +45,7 @@ class MoreEvents:
         if not how:  # no such list
             return
         lines, kind, what = {"contact/atom": ([f"compute {c}a all contact/atom", f"compute {c} all reduce sum c_{c}a"], "contacts", f"c_{c}"),
-                             "stress/atom virial": ([f"compute {c}a all stress/atom virial", f"compute {c} all reduce sum c_{c}a[1] c_{c}a[2] c_{c}a[3]"], "load", f"c_{c}[3]")}.get(how, ([], "load", "c_pressed"))
+                             "stress/atom virial": ([f"compute {c}a all stress/atom virial", f"compute {c} all reduce sum c_{c}a[1] c_{c}a[2] c_{c}a[3]"], "load", f"c_{c}[3]")}.get(how, ([], "load", "c_overlap"))
         column = f"v_{c}" if rng.random() < 0.5 else what
         self.say(*lines, f"variable {c} equal {what}", f"thermo_style custom step atoms ke c_ke {column}", f"run {rng.choice((20, 50, 100))}",
                  f'print "CHECK {c} {kind} ${{{c}}}"', f'if "${{{c}}} > 100" then "print much" else "print little"', "thermo_style custom step atoms ke c_ke")

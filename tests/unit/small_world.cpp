@@ -699,18 +699,15 @@ void SmallWalls::add_forces() {
 
 // ------------------------------------------------------------------------------------------------------------ the rest
 
-bool SmallInsertions::any() const { return !world_.deck.sources.empty(); }
-
 bool SmallInsertions::any_due(std::int64_t step) const {
   return std::any_of(world_.deck.sources.begin(), world_.deck.sources.end(), [&](const auto& s) { return s.next == step; });
 }
 
-std::vector<Box> SmallInsertions::boxes(bool soon, double margin) const {
+std::vector<Box> SmallInsertions::due_boxes(double largest) const {
   std::vector<Box> all;
-  const Vec3 m = Vec3::Constant(margin);
   for (const SmallDeck::Source& s : world_.deck.sources) {
     const std::int64_t steps = s.next - world_.run.step;
-    if (!soon || steps == 0 || steps == 1) all.push_back({s.box.lo - m, s.box.hi + m});
+    if (steps == 0 || steps == 1) all.push_back(s.box.grown_by(s.radius + largest));
   }
   return all;
 }

@@ -80,6 +80,7 @@ struct SmallDeck {
   struct Source {
     Box box;
     std::int64_t next = -1;  ///< step at which it inserts
+    double radius = 0;       ///< the largest of what it inserts
   };
   std::vector<Plane> planes;
   std::vector<Mesh> meshes;
@@ -224,12 +225,9 @@ class SmallWalls : public Walls {
 class SmallInsertions : public Insertions {
  public:
   explicit SmallInsertions(SmallWorld& world) : world_(world) {}
-  bool any() const override;
   bool any_due(std::int64_t step) const override;
-  std::vector<Box> boxes(bool soon, double margin) const override;
-  bool has_inserted() const override { return inserted; }
+  std::vector<Box> due_boxes(double largest) const override;
   std::vector<Box> counting(double) const override { return {}; }
-  bool inserted = false;
 
  private:
   SmallWorld& world_;

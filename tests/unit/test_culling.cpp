@@ -314,10 +314,8 @@ TEST(Culling, a_granule_inserted_into_the_place_of_a_culled_one_is_an_input_erro
   Column column(world);
   column.run(200);
   ASSERT_EQ(world.at(6), -1);  // stored
-  world.insertions.inserted = true;
-  world.add(100, Vec3(0.001 + r, 0.002, 11 * r), r);
-  world.borders();
-  EXPECT_THROW(column.culling.take_neighbours(), InputError);
+  column.culling.was_made(world.add(100, Vec3(0.001 + r, 0.002, 11 * r), r));
+  EXPECT_THROW(column.culling.change(), InputError);
 }
 
 TEST(Culling, the_beginning_of_a_run_out_of_order_is_an_internal_error) {

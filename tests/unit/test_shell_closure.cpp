@@ -23,11 +23,11 @@ struct Row {
   }
   static Vec3 x(int tag) { return Vec3((tag - 1) * 0.999 * 2 * r, 0, 0); }
   void ground() { parts.solid.ground(parts.body_of(1), true); }
-  std::size_t fetch(bool open_for_insertion = false) {
+  std::size_t fetch() {
     parts.census.count_bodies();
     parts.census.count_stored();
     parts.closure.share();
-    return parts.closure.fetch_what_is_near(open_for_insertion);
+    return parts.closure.fetch_what_is_near();
   }
   std::size_t store() {
     parts.index.index(world.atoms);
@@ -278,22 +278,66 @@ TEST(ShellClosure, who_is_at_a_wall_goes_to_the_store_only_once_its_body_stands)
 
 TEST(ShellClosure, where_granules_will_be_inserted_the_bed_is_opened) {
   SmallDeck deck = empty_space();
-  deck.sources = {{{Vec3(0.04, -0.01, -0.01), Vec3(0.06, 0.01, 0.01)}, 5}};
+  deck.sources = {{{Vec3(0.04, -0.01, -0.01), Vec3(0.06, 0.01, 0.01)}, 5, r}};
   Row row(deck);
   row.world.add(99, Vec3(0.5, 0.5, 0.5), r);
   row.parts.walls.update({}, false);
   row.parts.put_away(row.tags);
-  EXPECT_EQ(row.fetch(false), 0u);
-  EXPECT_GT(row.fetch(true), 0u);
-  for (const int tag : {5, 6, 7}) EXPECT_EQ(row.stored().count(tag), 0u) << tag;  // their centres are in the region
+  row.world.run.step = 3;
+  EXPECT_EQ(row.fetch(), 0u);  // two steps before
+  row.world.run.step = 4;
+  EXPECT_GT(row.fetch(), 0u);
+  // their centres are in the region, or as far from it as two granules reach
+  for (const int tag : {4, 5, 6, 7, 8}) EXPECT_EQ(row.stored().count(tag), 0u) << tag;
+  EXPECT_EQ(row.stored().count(1), 1u);
   // it stays open for the step of the insertion and the one before
   row.parts.walls.update({}, false);
-  row.world.run.step = 4;
   row.store();
-  for (const int tag : {5, 6, 7}) EXPECT_EQ(row.stored().count(tag), 0u) << tag;
+  for (const int tag : {4, 5, 6, 7, 8}) EXPECT_EQ(row.stored().count(tag), 0u) << tag;
   row.world.run.step = 6;
   row.store();
   EXPECT_EQ(row.stored(), all_but(10, {}));
+}
+
+TEST(ShellClosure, an_insertion_of_large_granules_opens_the_bed_as_far_as_they_reach) {
+  for (const double radius : {r, 3 * r, 20 * r}) {
+    SmallDeck deck = empty_space();
+    deck.sources = {{{Vec3(-0.001, -0.001, -0.001), Vec3(0.001, 0.001, 0.001)}, 1, radius}};
+    Row row(deck);
+    row.world.add(99, Vec3(0.5, 0.5, 0.5), r);
+    row.parts.walls.update({}, false);
+    row.parts.put_away(row.tags);
+    row.world.run.step = 1;
+    row.fetch();
+    for (int tag = 1; tag <= 10; ++tag) {
+      const bool must_open = Row::x(tag)[0] <= 0.001 + radius + r, may_open = Row::x(tag)[0] <= 0.001 + radius + 6 * r;
+      const bool open = !row.stored().count(tag);
+      EXPECT_TRUE(open ? may_open : !must_open) << tag << ' ' << radius;
+    }
+  }
+}
+
+TEST(ShellClosure, what_a_new_granule_overlaps_is_found_before_anything_comes_out_of_the_store) {
+  struct Case {
+    double gap;  // of the surfaces, in radii
+    bool made, stored;
+  };
+  for (const Case& c : {Case{-0.01, true, true}, Case{-0.01, true, false}, Case{0.01, true, true}, Case{-0.01, false, true}}) {
+    Row row;
+    if (c.stored) row.parts.put_away(row.tags);
+    const int i = row.world.add(99, Row::x(5) + Vec3(0, (2 + c.gap) * r, 0), r);
+    if (c.made) row.parts.closure.was_made(i);
+    const bool overlaps = c.made && c.gap < 0;
+    const ShellClosure::Overlapped found = row.parts.closure.by_new_granules();
+    EXPECT_EQ(found.in_stored, overlaps && c.stored ? 99 : 0) << c.gap;
+    ASSERT_EQ(found.places.size(), overlaps ? 1u : 0u) << c.gap;
+    if (overlaps) {
+      EXPECT_NEAR((found.places[0] - Row::x(5)).norm(), 0, 1e-12);
+    }
+    EXPECT_EQ(row.stored(), c.stored ? all_but(10, {}) : Tags());
+    row.parts.closure.forget_new();
+    EXPECT_TRUE(row.parts.closure.by_new_granules().places.empty());
+  }
 }
 
 TEST(ShellClosure, what_leaves_the_box_becomes_an_atom) {
@@ -352,7 +396,7 @@ TEST(ShellClosure, what_comes_near_on_another_rank_or_through_a_periodic_side_co
     parts.census.count_bodies();
     parts.census.count_stored();
     parts.closure.share();
-    EXPECT_EQ(parts.closure.fetch_what_is_near(false), w.ranks.me == 1 ? 2u : 0u);
+    EXPECT_EQ(parts.closure.fetch_what_is_near(), w.ranks.me == 1 ? 2u : 0u);
     EXPECT_EQ(w.at(1) >= 0 && w.at(3) >= 0, w.ranks.me == 1);
   });
 }

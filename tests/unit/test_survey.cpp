@@ -67,6 +67,20 @@ TEST(Survey, a_granule_at_rest_is_chosen_when_it_has_been_calm_for_so_many_looks
   EXPECT_EQ(bed.chosen(), (Tags{1, 2, 3}));
 }
 
+TEST(Survey, a_granule_that_a_fix_moves_on_a_way_of_its_own_is_not_chosen_before_it_is_released) {
+  Bed bed;
+  bed.row(1, 3, Vec3::Zero());
+  bed.begin();
+  std::vector<double> until(3 * static_cast<std::size_t>(bed.world.atoms.owned), 0.0);  // in the second of three columns
+  until[3 * static_cast<std::size_t>(bed.world.at(2)) + 1] = 1000;
+  bed.world.atoms.ways = {until.data() + 1, 3, 1000};
+  for (int n = 0; n < looks_to_calm; ++n) bed.look();
+  EXPECT_EQ(bed.chosen(), (Tags{1, 3}));
+  bed.world.atoms.ways.step = 1001;
+  for (int n = 0; n < looks_to_calm; ++n) bed.look();
+  EXPECT_EQ(bed.chosen(), (Tags{1, 2, 3}));
+}
+
 TEST(Survey, motion_against_a_neighbour_starts_the_count_anew) {
   Bed bed;
   bed.row(1, 4, Vec3::Zero());
