@@ -57,8 +57,7 @@ class InterfaceMesh {
   /// left empty. The next update() makes all of this one anew. Throws std::invalid_argument if its voxel differs.
   void merge(InterfaceMesh&& other);
 
-  /// Corners, in the frame of the body, of an axis-aligned box around all that an update() may change where nothing was touched;
-  /// false if there is nothing.
+  /// Corners of a box around the grid, in the frame of the body: beyond it all is far outside. False if there is nothing.
   bool grid_box(Vec3& lo, Vec3& hi) const;
 
   bool empty() const;                ///< nothing inside

@@ -94,7 +94,7 @@ class Golden(unittest.TestCase):
         self.assertGreater(float(values["cull[5]"]), 0)
         self.assertEqual(f"{float(values['cull[5]']):.17g}", values["cull[5]"], "full precision")
         self.assertEqual(list(self.line_with(lines, "granules", 50)["granules"]), ["granules", "bodies", "x", "v", "omega", "f"])
-        self.assertEqual(list(lines[-2]["files"]), ["end.restart", "bed.550.vtp", "mesh.550.vtp"])
+        self.assertEqual(list(lines[-2]["files"]), ["end.restart", "bed.0.vtp", "bed.550.vtp", "mesh.0.vtp", "mesh.550.vtp"])
         self.assertRegex(lines[-2]["said"][-2], "exterior, .* interior granules in .* energy added")
         self.assertRegex(lines[-2]["said"][-1], "the restart file holds .* interior granules besides the atoms")
         hashes = [line["granules"]["x"] for line in lines if "granules" in line]

@@ -391,8 +391,8 @@ class RegionRefusals(Case):
 
     @staticmethod
     def unknown_elsewhere(who, region):
-        return (f"{who}: region '{region}' is an interface/mesh or made of one, which each rank knows for its own granules and "
-                "which follows them: give a region of another style")
+        return (f"region interface/mesh: each rank knows it for its own granules, and it follows them: {who} cannot use "
+                f"'{region}'; give a region of another style")
 
     def test_fixes_that_ask_for_points_of_other_ranks(self):
         distribution = ("fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0014",

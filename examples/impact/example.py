@@ -49,6 +49,7 @@ def plot(runs, file):
 
 
 def moments(out, steps, runs):
+    steps = steps[1:]  # before the first one nothing has been struck
     for step in sorted({steps[round(k) - 1] for k in np.geomspace(1, len(steps), SHOWN)}):
         yield (f"{milliseconds(step):.0f} ms",
                *pictures.cut_away_files(out, step, BOX / 2, (0, 0, 0), (BOX, BOX, DEPTH), striker_radius=STRIKER))

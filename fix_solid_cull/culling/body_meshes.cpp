@@ -6,7 +6,7 @@
 namespace solidcull {
 
 const std::map<int, InterfaceMesh>& BodyMeshes::ask() {
-  if (held_) return meshes_;
+  if (held_ || !solid_.has_store()) return meshes_;  // before the first run nothing is culled
   wanted_ = true;
   if (behind()) update();
   for (auto& [body, mesh] : meshes_) mesh.set_pose(solid_.bodies().pose(body));

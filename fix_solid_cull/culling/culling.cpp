@@ -386,7 +386,7 @@ void Culling::meet_new_granules() {
       throw InputError("granule " + std::to_string(found.in_stored) +
                        " was inserted into the place of a culled one: give the insertion a region above the bed, or unfix " +
                        p_.ports.run.name + " first");
-    for (const Vec3& place : found.places) p_.wake.ask(place, p_.scales.wake_up().largest_radius());
+    for (const Vec3& place : found.places) p_.wake.ask(place, p_.scales.wake_up().radius(1));
   }
   p_.closure.forget_new();
 }

@@ -43,7 +43,6 @@ struct WakeUpLaw {
 
   /// Radius (m) of the ball that a waking granule carves: r0 (1 + c log2(excess)), at most cap r0. excess >= 1.
   double radius(double excess) const;
-  double largest_radius() const { return carve_cap * carve_radius; }  ///< of these balls (m)
 
   /// A granule that wakes beside this many others is in a front: a wave passes, or the support of many has gone. Balls around a
   /// front run ahead of it: with an r0 of one diameter a wave would lose a tenth of what it does to the floor, and a bed would

@@ -29,9 +29,9 @@ bool is_mesh(LAMMPS_NS::LAMMPS* lmp, const char* id) {
 
 bool begins_with(const char* word, const char* with) { return std::strncmp(word, with, std::strlen(with)) == 0; }
 
-std::string line(const char* id) {
-  return std::string("region '") + id + "' is an interface/mesh or made of one, which each rank knows for its own granules " +
-         "and which follows them: give a region of another style";
+std::string line(const std::string& who, const char* id) {
+  return "region interface/mesh: each rank knows it for its own granules, and it follows them: " + who + " cannot use '" + id +
+         "'; give a region of another style";
 }
 
 }  // namespace
@@ -59,7 +59,7 @@ std::string why_no_interface_mesh_for_fix(LAMMPS_NS::LAMMPS* lmp, int narg, cons
     return "";
   for (int w = 3; w < narg; ++w) {
     const bool named = names_only || std::strcmp(arg[w - 1], "region") == 0 || std::strcmp(arg[w - 1], "basevolume_region") == 0;
-    if (named && is_mesh(lmp, arg[w])) return "fix " + std::string(arg[0]) + " " + arg[2] + ": " + line(arg[w]);
+    if (named && is_mesh(lmp, arg[w])) return line("fix " + std::string(arg[0]) + " " + arg[2], arg[w]);
   }
   return "";
 }
@@ -69,7 +69,7 @@ std::string why_no_interface_mesh_for_command(LAMMPS_NS::LAMMPS* lmp, const std:
                                               const char* const* arg) {
   const bool random = command == "create_atoms" && narg > 4 && std::strcmp(arg[1], "random") == 0;
   if (!random || lmp->comm->nprocs == 1 || !is_mesh(lmp, arg[4])) return "";
-  return command + " random on several ranks: " + line(arg[4]);
+  return line(command + " random on several ranks", arg[4]);
 }
 
 }  // namespace solidcull

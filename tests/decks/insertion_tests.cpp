@@ -126,6 +126,10 @@ Outcome outcome(Engine& e, const Style& style, const Place& place, const std::st
   return {e.variable("n"), e.variable("k")};
 }
 
+// J: of a bed that comes to rest, a fifth of what it has where each granule moves as fast as what counts as rest at most. Those
+// that are culled have none
+constexpr double last_motion = 3e-8;
+
 TEST_P(Insertion, BringsAsManyGranulesAsWithoutCulling) {
   const auto& [style, place] = GetParam();
   Engine culled;
@@ -145,8 +149,8 @@ TEST_P(Insertion, BringsAsManyGranulesAsWithoutCulling) {
   if (culled.rank() == 0) std::printf("%s %s: culled %g, %g J\n", style.name, place.name, found.granules - 1300, found.energy);
   EXPECT_GE(found.granules, least);
   EXPECT_LE(found.granules, most);
-  EXPECT_GE(found.energy, 0.95 * least_energy - 1e-8);
-  EXPECT_LE(found.energy, 1.05 * most_energy + 1e-8);
+  EXPECT_GE(found.energy, 0.95 * least_energy - last_motion);
+  EXPECT_LE(found.energy, 1.05 * most_energy + last_motion);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Insertion, testing::Combine(testing::ValuesIn(styles), testing::ValuesIn(places)),
