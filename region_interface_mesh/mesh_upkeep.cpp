@@ -255,7 +255,8 @@ std::map<Coord, std::vector<Sphere>> InterfaceMesh::Impl::spheres_by_leaf(const 
     box = {Coord(box.min().x() >> 3, box.min().y() >> 3, box.min().z() >> 3),
            Coord(box.max().x() >> 3, box.max().y() >> 3, box.max().z() >> 3)};
     for_each_in(box, [&](const Coord& leaf) {
-      const Coord origin = leaf << 3;
+      constexpr int leaf_edge = 8;  // voxels; a shift of what is negative is undefined
+      const Coord origin(leaf_edge * leaf.x(), leaf_edge * leaf.y(), leaf_edge * leaf.z());
       if (grid->constTree().probeConstLeaf(origin) || grid->constTree().getValue(origin) < 0.0f) by_leaf[origin].push_back(s);
     });
   }
