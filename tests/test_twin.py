@@ -282,10 +282,18 @@ class Figures(unittest.TestCase):
     def test_ledger(self):
         kind = [("id", int), ("mass", float)]
         a = np.array([(1, 0.5), (2, 0.5), (3, 0.25)], kind)
-        self.assertEqual(metrics.ledger(a, [a[[0, 2]]]),
-                         {"granules": 3, "lost": 1, "ids_missing": 1, "mass": 1.25, "mass_lost": 0.5})
-        self.assertIsNone(metrics.ledger(a, [a, None]))
-        self.assertEqual(metrics.ledger(a, [a], granules=5)["lost"], 2, "the unculled run counts as little as the culled one")
+        self.assertEqual(metrics.ledger([a], [a[[0, 2]]]),
+                         {"granules": 3, "granules_of_runs": [3, 3], "lost": 1, "ids_missing": 1, "mass": 1.25, "mass_lost": 0.5})
+        self.assertIsNone(metrics.ledger([a], [a, None]))
+        self.assertEqual(metrics.ledger([a], [a], granules=5)["lost"], 2, "the unculled run counts as little as the culled one")
+
+    def test_where_chance_says_how_many_granules_come_all_unculled_runs_count(self):
+        kind = [("id", int), ("mass", float)]
+        a = np.array([(k, 0.5) for k in range(1, 7)], kind)
+        book = metrics.ledger([a[:3], a[[0, 1, 2, 4, 5]]], [a[:4]])
+        self.assertEqual((book["granules_of_runs"], book["lost"], book["ids_missing"], book["mass_lost"]), ([3, 5], 0, 0, 0))
+        self.assertEqual([metrics.ledger([a[:3], a[:5]], [culled])["lost"] for culled in (a[:2], a)], [1, -1])
+        self.assertEqual(metrics.ledger([a[:3], a[:5]], [a[1:4]])["ids_missing"], 1, "all unculled runs have granule 1")
 
     def test_a_figure_outside_its_margin_is_named(self):
         runs = [[twins.Run("r", [], 1.0, metrics={"good one": 1.0, "bad one": v})] for v in (1.0, 1.1)]

@@ -4,6 +4,7 @@ The noise floor of a figure is the largest value of the unculled runs minus the 
 of the culled and the mean of the unculled runs. It is good when it is not above the margin: the larger of a share of the unculled
 mean (2 %, if nothing else is said) and the noise floor.
 """
+import functools
 import itertools
 import statistics
 
@@ -28,7 +29,7 @@ def judge(unculled, culled, margin=MARGIN, least_margins=None, granules=None):
     for name in unculled[0].metrics:
         result["metrics"][name] = judged([r.metrics[name] for r in unculled], [r.metrics[name] for r in culled], margin,
                                          (least_margins or {}).get(name, 0.0))
-    result["ledger"] = ledger(unculled[0].final, [r.final for r in culled], granules)
+    result["ledger"] = ledger([r.final for r in unculled], [r.final for r in culled], granules)
     result["good"] = not is_lost(result["ledger"], unknown=False) and all(m["good"] for m in result["metrics"].values())
     result["no_scatter"] = len(unculled) > 1 and all(m["spread"] == 0 for m in result["metrics"].values())
     return result
@@ -52,17 +53,25 @@ def summary(runs):
     return result
 
 
+def outside_of(value, values):
+    """How far a value lies below the least of them (above 0), or above the largest (below 0)."""
+    return max(min(values) - value, 0) + min(max(values) - value, 0)
+
+
 def ledger(unculled, culled, granules=None):
     """Granules, ids and mass that the culled runs miss at the end (the worst of them); None if a deck did not get there. Granules are
-    counted against the number that the deck is known to hold, if it is; else against the unculled run."""
-    if unculled is None or any(c is None for c in culled):
+    counted against the number that the deck is known to hold, if it is; else against the unculled runs, which may differ where
+    granules are inserted or leave: what all of them have is due."""
+    if any(run is None for run in (*unculled, *culled)):
         return None
-    mass, due = float(unculled["mass"].sum()), len(unculled) if granules is None else granules
-    return {"granules": due,
-            "lost": max((due - len(c) for c in (unculled, *culled)), key=abs),
-            "ids_missing": max(len(np.setdiff1d(unculled["id"], c["id"])) for c in culled),
-            "mass": mass,
-            "mass_lost": max((mass - float(c["mass"].sum()) for c in culled), key=abs)}
+    masses = [float(u["mass"].sum()) for u in unculled]
+    counts = [len(u) for u in unculled] if granules is None else [granules]
+    ids = functools.reduce(np.intersect1d, [u["id"] for u in unculled])
+    return {"granules": counts[0], "granules_of_runs": [min(counts), max(counts)],
+            "lost": max((outside_of(len(run), counts) for run in (*unculled, *culled)), key=abs),
+            "ids_missing": max(len(np.setdiff1d(ids, c["id"])) for c in culled),
+            "mass": masses[0],
+            "mass_lost": max((outside_of(float(c["mass"].sum()), masses) for c in culled), key=abs)}
 
 
 def is_lost(book, unknown=True):

@@ -17,7 +17,8 @@ def table(result):
     u, c, book = result["unculled"], result["culled"], result["ledger"]
     lines = []
     if book:
-        lines.append(f"granules            {book['granules']:,}; lost {book['lost']:,}, ids missing {book['ids_missing']:,}, "
+        least, most = book["granules_of_runs"]
+        lines.append(f"granules            {f'{least:,}' if least == most else f'{least:,} to {most:,}'}; lost {book['lost']:,}, ids missing {book['ids_missing']:,}, "
                      f"mass lost {book['mass_lost']:.3g} of {book['mass']:.4g} kg")
     else:
         lines.append("granules            not checked: a run did not reach the last line of the deck")
