@@ -19,7 +19,7 @@ WEIGHT = 0.1         # of the weight: loads on the floor of two runs at rest
 SLACK = (5, 0.05)    # granules and share: counts that hang on chance
 CONTACTS = 0.25      # share: numbers of contacts of two runs
 RESTORED = {"contacts": 0.0, "load": 0.1}  # share: of the same granules; forces hang on speeds, which a set-up takes half a step later
-LOADS = (1e-6, 0.7)  # and share: sums of stresses (J) or of overlaps (m) over contacts
+LOADS = (1e-9, 0.7)  # and share: sums of stresses (J) or of overlaps (m) over contacts
 DRIVER = Path(__file__).resolve().parent / "driver.py"
 
 # the plug-in may refuse these; anything else that it refuses is to be looked at
