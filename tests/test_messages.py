@@ -409,6 +409,21 @@ class RegionRefusals(Case):
             self.refused(deck(FIX, *self.REGIONS, *distribution, f"fix ins all {style} {words}"),
                          self.unknown_elsewhere(f"fix ins {style}", "solid"))
 
+    def test_what_keeps_its_group_out_of_solid_bodies(self):
+        for region in ("solid", "nested"):
+            for line in (f"fix x all addforce 0 0 1e-4 region {region}", f"fix x all setforce NULL NULL 0 region {region}",
+                         f"fix x all aveforce NULL NULL 0 region {region}",
+                         f"fix x all buoyancy level 0.06 dim z density 1000 region {region}",
+                         f"fix x all wall/region {region} harmonic 0.1 0 0.005",
+                         f"fix x all property/atom/tracer region_mark {region} mark_step 20 check_mark_every 10",
+                         f"fix x all property/atom/regiontracer/time add_region {region} check_region_every 10",
+                         f"compute x all nparticles/tracer/region region_count {region} tracer tr"):
+                kind, _, _, style = line.split()[:4]
+                self.refused(deck(FIX, *self.REGIONS, line),
+                             f"region interface/mesh: granules of the group of {kind} x {style} are not culled, so none of them would be in "
+                             f"'{region}'; give a region of another style, or a group")
+        self.accepted(deck(FIX, *self.REGIONS, "fix x all addforce 0 0 1e-6 region half", "run 1"))
+
     def test_random_places_on_several_ranks(self):
         lines = deck(FIX, *self.REGIONS, "create_atoms 1 random 5 12345 both")
         self.refused(lines, self.unknown_elsewhere("create_atoms random on several ranks", "both"), ranks=2)

@@ -21,7 +21,7 @@ class Grounding : public BodyFollower {
       : ports_(ports), scales_(scales), solid_(solid), shell_(shell), groups_(groups), motion_(motion), walls_(walls) {}
 
   /// At each look: bodies at rest at walls that stand still are grounded; those that the walls might not hold any more wait to be
-  /// let go. `keep_frames`: bodies of one granule keep their own frame. Collective.
+  /// let go. Collective.
   void update();
   /// Which elements bear what presses on a body: those that bear the body. Collective; each look ends with it.
   void share_out_loads();

@@ -35,11 +35,11 @@ std::string find_out() {
   for (const Interposed& row : interposed) {
     const void* const own = next_symbol(row.symbol);
     const std::vector<const void*> targets = call_targets(own, row.symbol);
-    const std::string where = std::string(row.name) + " of this LIGGGHTS (" + file_of(own) + ")";
+    const auto where = [&] { return std::string(row.name) + " of this LIGGGHTS (" + file_of(own) + ")"; };
     if (targets.empty())
-      return "calls of " + where + " cannot be redirected: build LIGGGHTS without -Bsymbolic-functions, -Ofast";
+      return "calls of " + where() + " cannot be redirected: build LIGGGHTS without -Bsymbolic-functions, -Ofast";
     if (std::find(targets.begin(), targets.end(), own) != targets.end())
-      return "calls of " + where + " do not come here: link or preload libsolidcull.so before LIGGGHTS is loaded";
+      return "calls of " + where() + " do not come here: link or preload libsolidcull.so before LIGGGHTS is loaded";
   }
   const std::string file = file_of(next_symbol(symbol_of(Call::add_fix)));
   if (has_superquadrics(file) != superquadrics_expected)

@@ -25,12 +25,14 @@
 namespace solidcull {
 namespace {
 
-/// The engine's own function; looked for before lookups lead here.
+/// The engine's own function; looked for before lookups lead here. The engine's own program looks nothing up, and to lead it here
+/// would take it a pass over the engine's symbols for each function.
 template <class Function>
 class Own {
  public:
   Own(const char* name, Function ours) : own_(reinterpret_cast<Function>(engine::found_symbol(name))) {
-    if (own_) lookups_lead_to(reinterpret_cast<const void*>(own_), name, reinterpret_cast<const void*>(ours));
+    if (own_ && !is_own_program())
+      lookups_lead_to(reinterpret_cast<const void*>(own_), name, reinterpret_cast<const void*>(ours));
   }
   Function operator()() const { return own_; }
 

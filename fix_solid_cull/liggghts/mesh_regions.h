@@ -15,7 +15,7 @@ void region_was_made(LAMMPS_NS::LAMMPS* lmp, int narg, const char* const* arg);
 bool has_interface_mesh(LAMMPS_NS::LAMMPS* lmp);
 
 /// Why a fix, or a command, may not be given such a region; empty where it may. They ask for points that are not on their own
-/// rank, where the region is not known, or take its volume once and for all.
+/// rank, where the region is not known, take its volume once and for all, or keep their group out of solid bodies.
 std::string why_no_interface_mesh_for_fix(LAMMPS_NS::LAMMPS* lmp, int narg, const char* const* arg);
 std::string why_no_interface_mesh_for_command(LAMMPS_NS::LAMMPS* lmp, const std::string& command, int narg,
                                               const char* const* arg);

@@ -7,25 +7,10 @@
 #include "neigh_list.h"
 #include "pair_gran.h"
 #include "release.h"
+#include "swapped.h"
 #include "update.h"
 
 namespace solidcull {
-namespace {
-
-/// Sets a variable for a scope.
-template <class T>
-class Swapped {
- public:
-  Swapped(T& variable, T value) : variable_(variable), old_(variable) { variable = value; }
-  ~Swapped() { variable_ = old_; }
-
- private:
-  T& variable_;
-  T old_;
-};
-
-}  // namespace
-
 Vec3 PairForce::on_first(int i, int at) {
   const LAMMPS_NS::NeighList* list = force->pair->list;
   const LAMMPS_NS::NeighList* histories = force->pair->listgranhistory;

@@ -15,6 +15,7 @@
 #include "neigh_request.h"
 #include "neighbor.h"
 #include "pair.h"
+#include "swapped.h"
 #include "update.h"
 
 namespace solidcull {
@@ -43,25 +44,14 @@ bool needs_forces(LAMMPS_NS::LAMMPS* lmp, const LAMMPS_NS::Compute* c) {
          has_list(lmp, c);
 }
 
-template <class T>
-class Set {
- public:
-  Set(T& variable, T value) : variable_(variable), before_(variable) { variable = value; }
-  ~Set() { variable_ = before_; }
-
- private:
-  T& variable_;
-  T before_;
-};
-
 }  // namespace
 
 bool WholeBedForces::computing_ = false;
 
 WholeBedForces::WholeBedForces(LAMMPS_NS::LAMMPS* lmp, FixSolidCull& fix) : Pointers(lmp), fix_(fix) {
   fix_.lend_contacts();
-  const Set working(computing_, true);
-  const Set setup(update->setupflag, 1);  // the engine's word for: do not advance histories
+  const Swapped working(computing_, true);
+  const Swapped setup(update->setupflag, 1);  // the engine's word for: do not advance histories
   list_pairs();
   list_walls();
   compute();
