@@ -11,14 +11,14 @@ namespace solidcull {
 
 int BodyGroups::key_of(int body) const {
   const auto group = groups_.find(body);
-  return group == groups_.end() ? body * ports_.ranks.count + ports_.ranks.me : group->second.key;
+  return group == groups_.end() ? body * bed_.ranks.count + bed_.ranks.me : group->second.key;
 }
 
-bool BodyGroups::has_key_of_first_part(int body) const { return key_of(body) == body * ports_.ranks.count + ports_.ranks.me; }
+bool BodyGroups::has_key_of_first_part(int body) const { return key_of(body) == body * bed_.ranks.count + bed_.ranks.me; }
 
 int BodyGroups::key_of_atom(int i) const {
-  if (i < ports_.atoms.owned) return shell_[i].locked ? key_of(shell_[i].body) : 0;
-  const int* key = ghost_key_.find(ports_.atoms.tag[i]);
+  if (i < bed_.atoms.owned) return bed_.shell[i].locked ? key_of(bed_.shell[i].body) : 0;
+  const int* key = ghost_key_.find(bed_.atoms.tag[i]);
   return key ? *key : 0;
 }
 
@@ -32,8 +32,8 @@ int BodyGroups::spanning(int body) const {
 /// Stored granules that may touch one of another rank.
 std::vector<std::int64_t> BodyGroups::stored_at_borders() const {
   std::vector<std::int64_t> tags;
-  const Run& run = ports_.run;
-  const double reach = 2 * solid_.store().largest_radius() + run.skin + stored_.slack();
+  const Run& run = bed_.run;
+  const double reach = 2 * bed_.solid.store().largest_radius() + run.skin + stored_.slack();
   const Vec3 edges = run.edges();
   const Vec3 out = Vec3::Constant(reach + edges[0] + edges[1] + edges[2]);
   for (int d = 0; d < 3; ++d)
@@ -51,7 +51,7 @@ void BodyGroups::group() {
   groups_.clear();
   spanning_.clear();
   tied_.clear();
-  if (ports_.ranks.count == 1) return;
+  if (bed_.ranks.count == 1) return;
   // a contact across ranks joins the bodies of its two ends: each rank sends its end, all ranks join the same pairs
   struct End {
     std::int64_t low, high;
@@ -59,22 +59,22 @@ void BodyGroups::group() {
     Triple place;
   };
   std::vector<End> ends;
-  const SolidBodies& bodies = solid_.bodies();
-  const int ranks = ports_.ranks.count, me = ports_.ranks.me;
+  const SolidBodies& bodies = bed_.solid.bodies();
+  const int ranks = bed_.ranks.count, me = bed_.ranks.me;
   const auto reaches_out = [&](std::int64_t tag) {
     const int body = bodies.body_of(tag);
     if (!body) return;
-    solid_.contacts().for_each_partner(tag, [&](std::int64_t partner) {
+    bed_.solid.contacts().for_each_partner(tag, [&](std::int64_t partner) {
       if (bodies.body_of(partner)) return;
       const Vec3 x = bodies.pose(body).to_world(masses_(tag).position);
       ends.push_back({std::min(tag, partner), std::max(tag, partner), body * ranks + me, triple(x)});
     });
   };
-  for (int i = 0; i < ports_.atoms.owned; ++i)
-    if (shell_[i].locked) reaches_out(ports_.atoms.tag[i]);
+  for (int i = 0; i < bed_.atoms.owned; ++i)
+    if (bed_.shell[i].locked) reaches_out(bed_.atoms.tag[i]);
   for (const std::int64_t tag : stored_at_borders()) reaches_out(tag);
-  arrivals_.for_each([&](std::int64_t tag, const Arrival&) { reaches_out(tag); });
-  ends = ports_.ranks.gather(ends);
+  bed_.arrivals.for_each([&](std::int64_t tag, const Arrival&) { reaches_out(tag); });
+  ends = bed_.ranks.gather(ends);
   struct Link {
     int parent;
     Vec3 shift;  // this one's image + shift = the parent's image
@@ -89,7 +89,7 @@ void BodyGroups::group() {
     }
     return l;
   };
-  const Vec3 edges = ports_.run.edges();
+  const Vec3 edges = bed_.run.edges();
   std::map<std::pair<std::int64_t, std::int64_t>, std::size_t> first_end;
   std::set<int> joined;
   for (std::size_t r = 0; r < ends.size(); ++r) {
@@ -99,7 +99,7 @@ void BodyGroups::group() {
     const Link a = root(one.body), b = root(other.body);
     joined.insert({one.body, other.body});
     const Vec3 xa = vec(one.place), xb = vec(other.place);
-    Vec3 to_a = solid_.nearest_image(xb, xa) - xb;  // image of b + to_a = image of a, at this contact
+    Vec3 to_a = bed_.solid.nearest_image(xb, xa) - xb;  // image of b + to_a = image of a, at this contact
     for (int d = 0; d < 3; ++d) to_a[d] = edges[d] > 0 ? edges[d] * std::round(to_a[d] / edges[d]) : 0;
     const Vec3 shift = to_a + a.shift - b.shift;
     if (a.parent == b.parent) {
@@ -126,12 +126,12 @@ void BodyGroups::group() {
 
 void BodyGroups::settle() {
   group();
-  if (!scales_.rigid()) return;
-  for (auto& [number, body] : solid_.bodies_in_motion()) {
+  if (!bed_.scales.rigid()) return;
+  for (auto& [number, body] : bed_.solid.bodies_in_motion()) {
     const bool spans_ranks = spans(number);
     // what was a part of a larger body may have become a body of its own without a change of its granules
     body.note_span(spans_ranks);
-    if (body.grounded && !spans_ranks && body.mass.held == 0) solid_.ground(number, false);  // what held it has gone
+    if (body.grounded && !spans_ranks && body.mass.held == 0) bed_.solid.ground(number, false);  // what held it has gone
     if (!spans_ranks && body.changed) body.settle();
   }
   if (spanning_.empty()) return;
@@ -146,7 +146,7 @@ void BodyGroups::settle() {
     double grounded_mass;
   };
   std::vector<Part> mine;
-  for (const auto& [number, body] : solid_.bodies().bodies()) {
+  for (const auto& [number, body] : bed_.solid.bodies().bodies()) {
     if (!spans(number)) continue;
     const Group& group = groups_.at(number);
     const RigidPart p = body.part();
@@ -169,7 +169,7 @@ void BodyGroups::settle() {
     double grounded_of_itself = 0, mass = 0;
   };
   std::map<int, Whole> wholes;
-  for (const Part& row : ports_.ranks.gather(mine)) {
+  for (const Part& row : bed_.ranks.gather(mine)) {
     Whole& whole = wholes[row.key];
     RigidPart p;
     p.mass = row.mass;
@@ -184,12 +184,12 @@ void BodyGroups::settle() {
     whole.mass += row.mass;
     for (int d = 0; d < 3; ++d) tied_[row.key][d] |= row.tied[d];
   }
-  for (auto& [number, body] : solid_.bodies_in_motion()) {
+  for (auto& [number, body] : bed_.solid.bodies_in_motion()) {
     const Group& group = groups_.at(number);
     const auto found = wholes.find(group.key);
     if (found == wholes.end()) continue;
     const Whole& whole = found->second;
-    solid_.ground(number, whole.grounded && whole.held);
+    bed_.solid.ground(number, whole.grounded && whole.held);
     body.settle_as_part(whole.parts, SolidBody::free_axes(tied_.at(group.key)), group.shift,
                         whole.grounded_of_itself / whole.mass);
   }
@@ -197,17 +197,17 @@ void BodyGroups::settle() {
 
 void BodyGroups::share() {
   ghost_key_.clear();
-  if (!ports_.ranks.has_neighbours()) return;
+  if (!bed_.ranks.has_neighbours()) return;
   struct Row {
     Triple at;
     std::int64_t tag;
     int key;
   };
   std::vector<Row> rows;
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   for (int i = 0; i < atoms.owned; ++i)
-    if (shell_[i].locked) rows.push_back({triple(atoms.place(i)), atoms.tag[i], key_of(shell_[i].body)});
-  for (const Row& r : ports_.ranks.exchange(rows, contact_reach(ports_, solid_))) ghost_key_[r.tag] = r.key;
+    if (bed_.shell[i].locked) rows.push_back({triple(atoms.place(i)), atoms.tag[i], key_of(bed_.shell[i].body)});
+  for (const Row& r : bed_.ranks.exchange(rows, contact_reach(bed_))) ghost_key_[r.tag] = r.key;
 }
 
 void BodyGroups::release_memory() { release(ghost_key_); }

@@ -8,9 +8,6 @@
 
 #include "flat_map.h"
 #include "granule_masses.h"
-#include "ports.h"
-#include "shell.h"
-#include "solid.h"
 #include "stored_search.h"
 
 namespace solidcull {
@@ -18,9 +15,8 @@ namespace solidcull {
 /// Keys number bodies over all ranks, from 1; on one rank a body's key is its number. 0: no body.
 class BodyGroups {
  public:
-  BodyGroups(const Ports& ports, const Scales& scales, Solid& solid, const Shell& shell, const StoredSearch& stored,
-             const GranuleMasses& masses, const Arrivals& arrivals)
-      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), stored_(stored), masses_(masses), arrivals_(arrivals) {}
+  BodyGroups(BedState& bed, const StoredSearch& stored, const GranuleMasses& masses)
+      : bed_(bed), stored_(stored), masses_(masses) {}
 
   // --- local
   int key_of(int body) const;
@@ -52,13 +48,9 @@ class BodyGroups {
   };
   std::vector<std::int64_t> stored_at_borders() const;
 
-  const Ports& ports_;
-  const Scales& scales_;
-  Solid& solid_;
-  const Shell& shell_;
+  BedState& bed_;
   const StoredSearch& stored_;
   const GranuleMasses& masses_;
-  const Arrivals& arrivals_;
   std::map<int, Group> groups_;              // local body -> the body that it is a part of; empty on one rank
   std::vector<int> spanning_;                // keys of bodies that span ranks, the same on all ranks
   std::map<int, std::array<bool, 3>> tied_;  // key -> tied to its own periodic image in these directions

@@ -6,19 +6,19 @@
 namespace solidcull {
 
 const std::map<int, InterfaceMesh>& BodyMeshes::ask() {
-  if (held_ || !solid_.has_store()) return meshes_;  // before the first run nothing is culled
+  if (held_ || !bed_.solid.has_store()) return meshes_;  // before the first run nothing is culled
   wanted_ = true;
   if (behind()) update();
-  for (auto& [body, mesh] : meshes_) mesh.set_pose(solid_.bodies().pose(body));
+  for (auto& [body, mesh] : meshes_) mesh.set_pose(bed_.solid.bodies().pose(body));
   return meshes_;
 }
 
-bool BodyMeshes::behind() const { return !held_ && (changed_ || up_to_date_at_ != ports_.run.step || !has_all()); }
+bool BodyMeshes::behind() const { return !held_ && (changed_ || up_to_date_at_ != bed_.run.step || !has_all()); }
 
 /// Each body has its mesh, and nothing else has.
 bool BodyMeshes::has_all() const {
-  return meshes_.size() == solid_.bodies().size() &&
-         std::all_of(meshes_.begin(), meshes_.end(), [&](const auto& mesh) { return solid_.exists(mesh.first); });
+  return meshes_.size() == bed_.solid.bodies().size() &&
+         std::all_of(meshes_.begin(), meshes_.end(), [&](const auto& mesh) { return bed_.solid.exists(mesh.first); });
 }
 
 void BodyMeshes::hold() {
@@ -53,18 +53,19 @@ void BodyMeshes::granule_changed(int body, const Sphere& granule) {
 
 void BodyMeshes::update() {
   for (auto mesh = meshes_.begin(); mesh != meshes_.end();)
-    mesh = solid_.exists(mesh->first) ? std::next(mesh) : meshes_.erase(mesh);
-  for (const auto& body : solid_.bodies().bodies()) meshes_.try_emplace(body.first, scales_.voxel(), scales_.closing());
+    mesh = bed_.solid.exists(mesh->first) ? std::next(mesh) : meshes_.erase(mesh);
+  for (const auto& body : bed_.solid.bodies().bodies())
+    meshes_.try_emplace(body.first, bed_.scales.voxel(), bed_.scales.closing());
 
   const Bodies shell = interface_granules();
   SphereCells exterior;
-  exterior.build(exterior_granules(), 2 * scales_.diameter());
-  const GranuleStore& store = solid_.store();
+  exterior.build(exterior_granules(), 2 * bed_.scales.diameter());
+  const GranuleStore& store = bed_.solid.store();
   for (auto& [body, mesh] : meshes_) {
-    mesh.set_pose(solid_.bodies().pose(body));
+    mesh.set_pose(bed_.solid.bodies().pose(body));
     SphereCells interface;
     const auto found = shell.find(body);
-    if (found != shell.end()) interface.build(found->second, 2 * scales_.diameter());
+    if (found != shell.end()) interface.build(found->second, 2 * bed_.scales.diameter());
     const InterfaceMesh::Gather members = [&, body = body](const Vec3& lo, const Vec3& hi, const auto& visit) {
       store.for_each_in_box(store.frame_of(body), lo, hi, [&](const Resident& g) {
         if (g.body == body) visit({g.position, g.radius});
@@ -79,15 +80,15 @@ void BodyMeshes::update() {
     mesh.leave_out(near(mesh, exterior), members, largest);
   }
   changed_ = false;
-  up_to_date_at_ = ports_.run.step;
+  up_to_date_at_ = bed_.run.step;
 }
 
 /// By body, in its frame.
 BodyMeshes::Bodies BodyMeshes::interface_granules() const {
-  index_.index(ports_.atoms);
+  bed_.index.index(bed_.atoms);
   Bodies all;
-  solid_.bodies().for_each_member([&](std::int64_t tag, int body) {
-    const GranuleMass g = masses_(tag);
+  bed_.solid.bodies().for_each_member([&](std::int64_t tag, int body) {
+    const GranuleMass g = bed_.masses(tag);
     all[body].push_back({g.position, g.radius});
   });
   return all;
@@ -95,13 +96,13 @@ BodyMeshes::Bodies BodyMeshes::interface_granules() const {
 
 /// World frame, with those of other ranks, and periodic images.
 std::vector<Sphere> BodyMeshes::exterior_granules() const {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   std::vector<Sphere> all;
   for (int i = 0; i < atoms.owned + atoms.ghosts; ++i) {
-    const bool in_a_body = i < atoms.owned ? shell_.locked(i) || shown_.is_guest(i) : atoms.is_interface(i);
+    const bool in_a_body = i < atoms.owned ? bed_.shell.locked(i) || shown_.is_guest(i) : atoms.is_interface(i);
     if (!in_a_body) all.push_back(atoms.sphere(i));
   }
-  const Vec3& periods = solid_.bodies().periods();
+  const Vec3& periods = bed_.solid.bodies().periods();
   for (int d = 0; d < 3; ++d) {
     if (periods[d] == 0) continue;
     const std::size_t here = all.size();

@@ -5,12 +5,9 @@
 #include <map>
 #include <vector>
 
-#include "atom_index.h"
-#include "granule_masses.h"
+#include "bed.h"
 #include "interface_mesh.h"
-#include "ports.h"
 #include "shown_bed.h"
-#include "solid.h"
 #include "sphere_cells.h"
 
 namespace solidcull {
@@ -18,9 +15,7 @@ namespace solidcull {
 /// Follows each granule that comes to a body or leaves it, and works on what has changed when it is asked. Local.
 class BodyMeshes : public BodyFollower {
  public:
-  BodyMeshes(const Ports& ports, const Scales& scales, const Solid& solid, const Shell& shell, AtomIndex& index,
-             const GranuleMasses& masses, const ShownBed& shown)
-      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), index_(index), masses_(masses), shown_(shown) {}
+  BodyMeshes(Bed& bed, const ShownBed& shown) : bed_(bed), shown_(shown) {}
 
   /// The meshes by body number, as granules and bodies are now, or as hold() found them.
   const std::map<int, InterfaceMesh>& ask();
@@ -45,12 +40,7 @@ class BodyMeshes : public BodyFollower {
   std::vector<Sphere> exterior_granules() const;
   std::vector<Sphere> near(const InterfaceMesh& mesh, const SphereCells& exterior) const;
 
-  const Ports& ports_;
-  const Scales& scales_;
-  const Solid& solid_;
-  const Shell& shell_;
-  AtomIndex& index_;
-  const GranuleMasses& masses_;
+  Bed& bed_;
   const ShownBed& shown_;
   bool wanted_ = false, held_ = false;
   bool lost_track_ = false;          // granules have changed while they were held

@@ -25,38 +25,38 @@ void BodyMotion::refresh() {
   slot_.clear();
   place_.clear();
   riding_.clear();
-  if (solid_.bodies().bodies().empty()) return;
-  const Atoms& atoms = ports_.atoms;
+  if (bed_.solid.bodies().bodies().empty()) return;
+  const Atoms& atoms = bed_.atoms;
   FlatMap<int> slot;
   FlatMap<char> has_atoms;
   for (int i = 0; i < atoms.owned; ++i)
-    if (shell_[i].in_body()) has_atoms[shell_[i].body] = 1;
-  const Vec3 g = ports_.run.gravity();
-  for (auto& [number, body] : solid_.bodies_in_motion()) {
+    if (bed_.shell[i].in_body()) has_atoms[bed_.shell[i].body] = 1;
+  const Vec3 g = bed_.run.gravity();
+  for (auto& [number, body] : bed_.solid.bodies_in_motion()) {
     // what sleeps on the ground and has no atoms costs nothing
-    const int spanning = groups_.spanning(number);
-    if (body.grounded && spanning < 0 && !has_atoms.contains(number) && solid_.walls_bear(number, g)) continue;
+    const int spanning = bed_.groups.spanning(number);
+    if (body.grounded && spanning < 0 && !has_atoms.contains(number) && bed_.solid.walls_bear(number, g)) continue;
     slot[number] = static_cast<int>(active_.size());
     active_.push_back({number, &body});
-    active_.back().stands = solid_.stands(number);
+    active_.back().stands = bed_.solid.stands(number);
     active_.back().spanning = spanning;
   }
-  solid_.store().for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
+  bed_.solid.store().for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
     const int* s = slot.find(body);
-    if (!s && !solid_.exists(body))
+    if (!s && !bed_.solid.exists(body))
       throw InternalError("interior granules belong to body " + std::to_string(body) + ", which is not there");
     if (!s || active_[*s].stands) return;
     const SolidBody& b = *active_[*s].body;
     active_[*s].reach = (b.pose.to_world(0.5 * (lo + hi)) - b.motion.centre()).norm() + 0.5 * (hi - lo).norm();
   });
   for (int i = 0; i < atoms.owned; ++i) {
-    if (!shell_[i].locked || shell_[i].body == Locked::arriving) continue;
-    const int* s = slot.find(shell_[i].body);
+    if (!bed_.shell[i].locked || bed_.shell[i].body == Locked::arriving) continue;
+    const int* s = slot.find(bed_.shell[i].body);
     if (!s) throw InternalError("interface granule " + std::to_string(atoms.tag[i]) + " belongs to no body");
     atoms_.push_back(i);
     slot_.push_back(static_cast<std::size_t>(*s));
     if (!active_[*s].stands) riding_.push_back(atoms_.size() - 1);
-    place_.push_back(shell_[i].place);
+    place_.push_back(bed_.shell[i].place);
   }
 }
 
@@ -85,10 +85,10 @@ inline void BodyMotion::add_to_body(std::size_t k, const Vec3& contact, const Ve
 
 void BodyMotion::take_loads() {
   largest_excess_ = 0;
-  const bool moves = scales_.rigid(), turns = ports_.contacts.turn_granules;
-  const Vec3 g = ports_.run.gravity();
-  const WakeUpLaw& law = scales_.wake_up();
-  Atoms& atoms = ports_.atoms;
+  const bool moves = bed_.scales.rigid(), turns = bed_.contacts.turn_granules;
+  const Vec3 g = bed_.run.gravity();
+  const WakeUpLaw& law = bed_.scales.wake_up();
+  Atoms& atoms = bed_.atoms;
   for (ActiveBody& a : active_) a.force = a.torque = a.change = Vec3::Zero();
   for (std::size_t k = 0; k < atoms_.size(); ++k) {
     const int i = atoms_[k];
@@ -97,14 +97,14 @@ void BodyMotion::take_loads() {
     ActiveBody& a = active_[slot_[k]];
     if (moves && !a.stands) add_to_body(k, in_world - atoms.mass[i] * g, turns ? torque : Vec3(Vec3::Zero()));
     if (a.stands) a.change += in_world - atoms.mass[i] * g;
-    const double tolerance = law.tolerance(atoms.mass[i], shell_[i].normal_load);
-    largest_excess_ = std::max(largest_excess_, shell_.take_load(i, a.body->pose.turned_to_frame(in_world), tolerance));
+    const double tolerance = law.tolerance(atoms.mass[i], bed_.shell[i].normal_load);
+    largest_excess_ = std::max(largest_excess_, bed_.shell.take_load(i, a.body->pose.turned_to_frame(in_world), tolerance));
     atoms.clear_force(i);
     if (turns) atoms.clear_torque(i);  // else what walls turn is the granule alone: the engine's integrator sees to that
   }
-  if (scales_.sleeping())
+  if (bed_.scales.sleeping())
     for (ActiveBody& a : active_)
-      if (a.stands) a.change += solid_.wall_loads().force(a.number) + a.body->mass.mass * g;
+      if (a.stands) a.change += bed_.solid.wall_loads().force(a.number) + a.body->mass.mass * g;
   if (!moves) return;
   // contacts and other forces on interface granules are there; gravity pulls the whole mass
   for (ActiveBody& a : active_) a.torque += (a.body->pose.origin() - a.body->motion.centre()).cross(a.force);
@@ -113,9 +113,9 @@ void BodyMotion::take_loads() {
 }
 
 void BodyMotion::sum_over_ranks() {
-  if (groups_.spanning_bodies() == 0) return;
+  if (bed_.groups.spanning_bodies() == 0) return;
   constexpr std::size_t numbers = 9;
-  std::vector<double> sums(numbers * groups_.spanning_bodies(), 0.0);
+  std::vector<double> sums(numbers * bed_.groups.spanning_bodies(), 0.0);
   for (const ActiveBody& a : active_) {
     if (a.spanning < 0) continue;
     double* of = &sums[numbers * static_cast<std::size_t>(a.spanning)];
@@ -125,7 +125,7 @@ void BodyMotion::sum_over_ranks() {
       of[6 + d] += a.change[d];
     }
   }
-  ports_.ranks.sum(sums.data(), static_cast<int>(sums.size()));
+  bed_.ranks.sum(sums.data(), static_cast<int>(sums.size()));
   for (ActiveBody& a : active_) {
     if (a.spanning < 0) continue;
     const double* of = &sums[numbers * static_cast<std::size_t>(a.spanning)];
@@ -138,7 +138,7 @@ void BodyMotion::sum_over_ranks() {
 // ------------------------------------------------------------------------------------------------------------ motion
 
 void BodyMotion::kick_and_drift() {
-  const Run& run = ports_.run;
+  const Run& run = bed_.run;
   const Vec3 edges = run.edges();
   for (ActiveBody& a : active_) {
     if (a.stands) continue;
@@ -160,34 +160,34 @@ void BodyMotion::kick_and_drift() {
 
 /// A load too large for its time step has taken the body out of all numbers.
 void BodyMotion::stop_at(const ActiveBody& a) const {
-  const auto at = std::find_if(atoms_.begin(), atoms_.end(), [&](int i) { return shell_[i].body == a.number; });
+  const auto at = std::find_if(atoms_.begin(), atoms_.end(), [&](int i) { return bed_.shell[i].body == a.number; });
   if (at == atoms_.end())
     throw RunFailure("the motion of solid body " + std::to_string(a.number) + " is no number: take a smaller timestep");
   const Twist& t = a.body->twist;
   const bool goes = std::isfinite(t.velocity.sum());
-  is_no_number(ports_.atoms.tag[*at], goes ? "spin" : "velocity", goes ? t.spin : t.velocity);
+  is_no_number(bed_.atoms.tag[*at], goes ? "spin" : "velocity", goes ? t.spin : t.velocity);
 }
 
 void BodyMotion::kick() {
   for (ActiveBody& a : active_) {
     if (a.stands) continue;
-    a.body->kick(a.force, a.torque, 0.5 * ports_.run.dt);
+    a.body->kick(a.force, a.torque, 0.5 * bed_.run.dt);
     a.body->take_twist();
   }
 }
 
 double BodyMotion::way_in_a_step(const ActiveBody& a) const {
-  return a.reach > 0 ? ports_.run.dt * (a.body->motion.velocity().norm() + a.body->motion.spin().norm() * a.reach) : 0.0;
+  return a.reach > 0 ? bed_.run.dt * (a.body->motion.velocity().norm() + a.body->motion.spin().norm() * a.reach) : 0.0;
 }
 
 bool BodyMotion::comes_too_far(int steps) const {
   return std::any_of(active_.begin(), active_.end(),
-                     [&](const ActiveBody& a) { return a.way + steps * way_in_a_step(a) > 0.5 * ports_.run.skin; });
+                     [&](const ActiveBody& a) { return a.way + steps * way_in_a_step(a) > 0.5 * bed_.run.skin; });
 }
 
 bool BodyMotion::is_fast(int steps) const {
   return std::any_of(active_.begin(), active_.end(),
-                     [&](const ActiveBody& a) { return steps * way_in_a_step(a) > 0.25 * ports_.run.skin; });
+                     [&](const ActiveBody& a) { return steps * way_in_a_step(a) > 0.25 * bed_.run.skin; });
 }
 
 /// The velocity field over places in the body's frame: v = constant + gradient * place.
@@ -208,22 +208,22 @@ std::vector<BodyMotion::FieldInFrame> BodyMotion::fields() const {
 }
 
 void BodyMotion::place() {
-  const bool periodic = ports_.run.any_periodic();
+  const bool periodic = bed_.run.any_periodic();
   const std::vector<FieldInFrame> of = fields();
-  Atoms& atoms = ports_.atoms;
+  Atoms& atoms = bed_.atoms;
   for (const std::size_t k : riding_) {
     const int i = atoms_[k];
     const SolidBody& b = *active_[slot_[k]].body;
     const Vec3 x = b.pose.to_world(place_[k]);
-    atoms.set_place(i, periodic ? solid_.nearest_image(x, atoms.place(i)) : x);
+    atoms.set_place(i, periodic ? bed_.solid.nearest_image(x, atoms.place(i)) : x);
     atoms.set_velocity(i, of[slot_[k]].at(place_[k]));
-    if (ports_.contacts.turn_granules) atoms.set_spin(i, b.twist.spin);
+    if (bed_.contacts.turn_granules) atoms.set_spin(i, b.twist.spin);
   }
 }
 
 void BodyMotion::give_velocity(std::size_t k, const std::vector<FieldInFrame>& of) {
-  ports_.atoms.set_velocity(atoms_[k], of[slot_[k]].at(place_[k]));
-  if (ports_.contacts.turn_granules) ports_.atoms.set_spin(atoms_[k], active_[slot_[k]].body->twist.spin);
+  bed_.atoms.set_velocity(atoms_[k], of[slot_[k]].at(place_[k]));
+  if (bed_.contacts.turn_granules) bed_.atoms.set_spin(atoms_[k], active_[slot_[k]].body->twist.spin);
 }
 
 void BodyMotion::give_velocities_to_riders() {

@@ -4,10 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "body_groups.h"
-#include "ports.h"
-#include "shell.h"
-#include "solid.h"
+#include "bed.h"
 
 namespace solidcull {
 
@@ -27,8 +24,7 @@ struct ActiveBody {
 /// The bodies' loads, momentum and places, and the interface granules that ride on them.
 class BodyMotion : public BodyFollower {
  public:
-  BodyMotion(const Ports& ports, const Scales& scales, Solid& solid, Shell& shell, const BodyGroups& groups)
-      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), groups_(groups) {}
+  explicit BodyMotion(Bed& bed) : bed_(bed) {}
 
   const std::vector<ActiveBody>& active() const { return active_; }
   /// Atom indices of the interface granules, since the last refresh(); number k stands in active()[slot(k)].
@@ -75,11 +71,7 @@ class BodyMotion : public BodyFollower {
   [[noreturn]] void stop_at(const ActiveBody& a) const;
   double way_in_a_step(const ActiveBody& a) const;
 
-  const Ports& ports_;
-  const Scales& scales_;
-  Solid& solid_;
-  Shell& shell_;
-  const BodyGroups& groups_;
+  Bed& bed_;
   std::vector<ActiveBody> active_;
   std::vector<int> atoms_;           // indices of interface granules
   std::vector<std::size_t> slot_;    // their bodies in active_

@@ -3,14 +3,13 @@
 
 #include <cstdint>
 
-#include "ports.h"
-#include "solid.h"
+#include "bed_state.h"
 
 namespace solidcull {
 
 class Census {
  public:
-  Census(const Ports& ports, const Solid& solid) : ports_(ports), solid_(solid) {}
+  explicit Census(const BedState& bed) : bed_(bed) {}
 
   bool something_stored() const { return stored_ > 0; }
   std::int64_t stored() const { return stored_; }
@@ -20,22 +19,22 @@ class Census {
 
   /// Collective.
   void count_bodies() {
-    std::int64_t counts[2] = {static_cast<std::int64_t>(solid_.bodies().size()), static_cast<std::int64_t>(solid_.locked())};
-    ports_.ranks.sum(counts, 2);
+    std::int64_t counts[2] = {static_cast<std::int64_t>(bed_.solid.bodies().size()),
+                              static_cast<std::int64_t>(bed_.solid.locked())};
+    bed_.ranks.sum(counts, 2);
     bodies_ = counts[0];
     locked_ = counts[1];
   }
   /// Returns how many more are stored than the time before. Collective.
   std::int64_t count_stored() {
     const std::int64_t before = stored_;
-    stored_ = static_cast<std::int64_t>(solid_.store().size());
-    ports_.ranks.sum(&stored_, 1);
+    stored_ = static_cast<std::int64_t>(bed_.solid.store().size());
+    bed_.ranks.sum(&stored_, 1);
     return stored_ - before;
   }
 
  private:
-  const Ports& ports_;
-  const Solid& solid_;
+  const BedState& bed_;
   std::int64_t stored_ = 0;  // interior granules
   std::int64_t locked_ = 0;  // interface and interior granules
   std::int64_t bodies_ = 0;  // parts of bodies, on all ranks

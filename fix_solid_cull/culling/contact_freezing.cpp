@@ -9,20 +9,20 @@
 namespace solidcull {
 
 bool ContactFreezing::is_locked(std::int64_t tag, const Changes& changes) const {
-  if (const int* i = index_.find(tag)) return shell_[*i].locked;
-  return changes.locked_anywhere.contains(tag) || (groups_.ghost(tag) && !changes.freed_anywhere.contains(tag));
+  if (const int* i = bed_.index.find(tag)) return bed_.shell[*i].locked;
+  return changes.locked_anywhere.contains(tag) || (bed_.groups.ghost(tag) && !changes.freed_anywhere.contains(tag));
 }
 
 /// In this change, and not before it in the same step.
 bool ContactFreezing::just_locked(int i) const {
-  const Locked& e = shell_[i];
-  return e.locked && e.lock_step == ports_.run.step && e.came_back != ports_.run.step;
+  const Locked& e = bed_.shell[i];
+  return e.locked && e.lock_step == bed_.run.step && e.came_back != bed_.run.step;
 }
 
 /// The load of a contact that goes inside stays in the balance that the older granule was locked with (invariant I5).
 void ContactFreezing::rebase(int i, std::int64_t partner, const double* history) {
-  if (shell_[i].fresh) return;
-  if (const int* j = index_.find(partner)) shell_.rebase(i, -ports_.contacts.force_on_first(i, *j, history));
+  if (bed_.shell[i].fresh) return;
+  if (const int* j = bed_.index.find(partner)) bed_.shell.rebase(i, -bed_.contacts.force_on_first(i, *j, history));
 }
 
 void ContactFreezing::freeze(const Changes& changes, const Proposal& proposal) {
@@ -36,57 +36,58 @@ void ContactFreezing::freeze(const Changes& changes, const Proposal& proposal) {
     return locked(b) &&
            (changes.locked_anywhere.contains(a) || changes.locked_anywhere.contains(b) || joined.count(ordered(a, b)));
   };
-  const Atoms& atoms = ports_.atoms;
-  const FrozenContacts& frozen = solid_.contacts();
-  const HistoryRows histories = ports_.contacts.histories();
+  const Atoms& atoms = bed_.atoms;
+  const FrozenContacts& frozen = bed_.solid.contacts();
+  const HistoryRows histories = bed_.contacts.histories();
   for (int i = 0; i < atoms.owned; ++i) {
-    if (!shell_[i].locked) continue;
+    if (!bed_.shell[i].locked) continue;
     const std::int64_t tag = atoms.tag[i];
     histories.for_each_partner(i, [&](std::int64_t partner, const double* history) {
-      const int* j = index_.find(partner);
+      const int* j = bed_.index.find(partner);
       if (j && just_locked(i) && just_locked(*j)) {  // most are: seen from both sides, and without contacts until now
-        if (i < *j) solid_.freeze(tag, partner, history);
+        if (i < *j) bed_.solid.freeze(tag, partner, history);
         return;
       }
       if (!freezes(tag, partner)) return;
-      if (!frozen.contains(tag, partner)) solid_.freeze(tag, partner, history);
+      if (!frozen.contains(tag, partner)) bed_.solid.freeze(tag, partner, history);
       rebase(i, partner, history);
     });
   }
   for (const Proposal::Touch& t : proposal.touches)
     if (locked(t.a) && freezes(t.a, t.b) && !frozen.contains(t.a, t.b)) {
-      solid_.freeze_in_frame(t.a, t.b, nullptr);
+      bed_.solid.freeze_in_frame(t.a, t.b, nullptr);
       if (frozen.width()) continue;  // touching within the gap: no force
-      if (const int* a = index_.find(t.a)) rebase(*a, t.b, nullptr);
-      if (const int* b = index_.find(t.b)) rebase(*b, t.a, nullptr);
+      if (const int* a = bed_.index.find(t.a)) rebase(*a, t.b, nullptr);
+      if (const int* b = bed_.index.find(t.b)) rebase(*b, t.a, nullptr);
     }
   for (const auto& [a, b] : joined)  // other ranks have told of theirs
-    if ((index_.contains(a) || index_.contains(b)) && !frozen.contains(a, b)) solid_.freeze_in_frame(a, b, nullptr);
+    if ((bed_.index.contains(a) || bed_.index.contains(b)) && !frozen.contains(a, b)) bed_.solid.freeze_in_frame(a, b, nullptr);
   for (const Proposal::SideChange& c : proposal.side_changes) {
-    const int* i = index_.find(c.interface_tag);
-    if (i && shell_[*i].locked && !shell_[*i].fresh && freezes(c.interface_tag, c.other_tag)) shell_.rebase(*i, -c.force);
+    const int* i = bed_.index.find(c.interface_tag);
+    if (i && bed_.shell[*i].locked && !bed_.shell[*i].fresh && freezes(c.interface_tag, c.other_tag))
+      bed_.shell.rebase(*i, -c.force);
   }
 }
 
 void ContactFreezing::freeze_between_merged() {
-  if (solid_.contacts().width() == 0) return;
-  groups_.share();
-  const Atoms& atoms = ports_.atoms;
-  const HistoryRows histories = ports_.contacts.histories();
+  if (bed_.solid.contacts().width() == 0) return;
+  bed_.groups.share();
+  const Atoms& atoms = bed_.atoms;
+  const HistoryRows histories = bed_.contacts.histories();
   for (int i = 0; i < atoms.owned; ++i) {
-    if (!shell_[i].locked) continue;
+    if (!bed_.shell[i].locked) continue;
     const std::int64_t tag = atoms.tag[i];
-    const int own = groups_.key_of(shell_[i].body);
+    const int own = bed_.groups.key_of(bed_.shell[i].body);
     histories.for_each_partner(i, [&](std::int64_t partner, const double* history) {
-      const int* j = index_.find(partner);
+      const int* j = bed_.index.find(partner);
       if (j && just_locked(i) && just_locked(*j)) return;  // freeze() has seen to it
-      const int* ghost = j ? nullptr : groups_.ghost(partner);
-      const int other = j ? (shell_[*j].locked ? groups_.key_of(shell_[*j].body) : 0) : ghost ? *ghost : 0;
-      if (other != own || solid_.contacts().contains(tag, partner)) return;
-      solid_.freeze(tag, partner, history);
+      const int* ghost = j ? nullptr : bed_.groups.ghost(partner);
+      const int other = j ? (bed_.shell[*j].locked ? bed_.groups.key_of(bed_.shell[*j].body) : 0) : ghost ? *ghost : 0;
+      if (other != own || bed_.solid.contacts().contains(tag, partner)) return;
+      bed_.solid.freeze(tag, partner, history);
       if (!j) return;
-      if (!shell_[i].fresh) shell_.rebase(i, -ports_.contacts.force_on_first(i, *j, history));
-      if (!shell_[*j].fresh) shell_.rebase(*j, ports_.contacts.force_on_first(i, *j, history));
+      if (!bed_.shell[i].fresh) bed_.shell.rebase(i, -bed_.contacts.force_on_first(i, *j, history));
+      if (!bed_.shell[*j].fresh) bed_.shell.rebase(*j, bed_.contacts.force_on_first(i, *j, history));
     });
   }
 }
@@ -100,7 +101,7 @@ void ContactFreezing::thaw(const Changes& changes) {
     int atom;
     std::int32_t partner;
   };
-  const FrozenContacts& frozen = solid_.contacts();
+  const FrozenContacts& frozen = bed_.solid.contacts();
   const std::size_t width = frozen.width();
   constexpr std::size_t chunk_bytes = 4096;  // some hundred are given as a rule, millions where a large bed is restored
   ChunkedArray<Given> given(1, chunk_bytes);
@@ -112,26 +113,26 @@ void ContactFreezing::thaw(const Changes& changes) {
     std::copy(history, history + width, numbers);
     return numbers;
   };
-  const SolidBodies& bodies = solid_.bodies();
+  const SolidBodies& bodies = bed_.solid.bodies();
   for (const std::int64_t tag : freed) {
-    const int* mine = index_.find(tag);
+    const int* mine = bed_.index.find(tag);
     const int own = bodies.body_of(tag);
     frozen.for_each(tag, [&](std::int64_t partner, const double* history) {
       if (!history || (partner < tag && changes.freed_anywhere.contains(partner))) return;
       const Eigen::Matrix3d& turn = bodies.pose(own ? own : bodies.body_of(partner)).turn();
       if (double* const h = give(mine, partner, history)) frozen.turn(h, turn);
-      if (double* const h = give(index_.find(partner), tag, history)) {
+      if (double* const h = give(bed_.index.find(partner), tag, history)) {
         frozen.turn(h, turn);
         frozen.change_side(h);
       }
     });
   }
-  if (scales_.refills()) {
+  if (bed_.scales.refills()) {
     kept_.clear();
-    for (std::size_t g = 0; g < given.size(); ++g) kept_.insert(ordered(ports_.atoms.tag[given[g].atom], given[g].partner));
-    const HistoryRows rows = ports_.contacts.histories();
+    for (std::size_t g = 0; g < given.size(); ++g) kept_.insert(ordered(bed_.atoms.tag[given[g].atom], given[g].partner));
+    const HistoryRows rows = bed_.contacts.histories();
     for (const std::int64_t tag : freed)
-      if (const int* i = index_.find(tag))
+      if (const int* i = bed_.index.find(tag))
         rows.for_each_partner(*i, [&](std::int64_t partner, const double*) { kept_.insert(ordered(tag, partner)); });
   }
   std::vector<std::uint32_t> by_atom(given.size());
@@ -144,39 +145,39 @@ void ContactFreezing::thaw(const Changes& changes) {
     of_one.clear();
     for (; g < by_atom.size() && given[by_atom[g]].atom == atom; ++g)
       of_one.push_back({given[by_atom[g]].partner, histories.row(by_atom[g])});
-    ports_.contacts.give_histories(atom, of_one.data(), of_one.size());
+    bed_.contacts.give_histories(atom, of_one.data(), of_one.size());
   }
   thawed_ = changes.freed_anywhere;
 }
 
 /// Half of force times overlap: exact for Hooke's law, a quarter too much for Hertz's.
 void ContactFreezing::count_energy_of_new_contacts() const {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   double energy = 0;
-  ports_.contacts.neighbours().for_each_pair(atoms.owned, [&](int i, int j, int k) {
+  bed_.contacts.neighbours().for_each_pair(atoms.owned, [&](int i, int j, int k) {
     if (!thawed_.contains(atoms.tag[i]) && !thawed_.contains(atoms.tag[j])) return;
     const double overlap = atoms.radius[i] + atoms.radius[j] - (atoms.place(i) - atoms.place(j)).norm();
     if (overlap <= 0 || kept_.count(ordered(atoms.tag[i], atoms.tag[j]))) return;
     const double share = j < atoms.owned ? 1.0 : 0.5;  // another rank sees it, too
-    energy += share * 0.5 * ports_.contacts.force_on_first(i, k).norm() * overlap;
+    energy += share * 0.5 * bed_.contacts.force_on_first(i, k).norm() * overlap;
   });
-  solid_.count_refilled(energy);
+  bed_.solid.count_refilled(energy);
 }
 
 void ContactFreezing::rebase_thawed() {
   if (thawed_.empty()) return;
-  if (scales_.refills()) count_energy_of_new_contacts();
-  const Atoms& atoms = ports_.atoms;
+  if (bed_.scales.refills()) count_energy_of_new_contacts();
+  const Atoms& atoms = bed_.atoms;
   const int owned = atoms.owned;
-  ports_.contacts.neighbours().for_each_pair(owned, [&](int i, int j, int k) {
-    const bool stays = shell_[i].locked && !shell_[i].fresh && thawed_.contains(atoms.tag[j]);
-    const bool other_stays = j < owned && shell_[j].locked && !shell_[j].fresh && thawed_.contains(atoms.tag[i]);
+  bed_.contacts.neighbours().for_each_pair(owned, [&](int i, int j, int k) {
+    const bool stays = bed_.shell[i].locked && !bed_.shell[i].fresh && thawed_.contains(atoms.tag[j]);
+    const bool other_stays = j < owned && bed_.shell[j].locked && !bed_.shell[j].fresh && thawed_.contains(atoms.tag[i]);
     if (!stays && !other_stays) return;
-    const double reach = (atoms.radius[i] + atoms.radius[j]) * ports_.contacts.reach_factor;
+    const double reach = (atoms.radius[i] + atoms.radius[j]) * bed_.contacts.reach_factor;
     if ((atoms.place(i) - atoms.place(j)).squaredNorm() > reach * reach) return;
-    const Vec3 f = ports_.contacts.force_on_first(i, k);
-    if (stays) shell_.rebase(i, f);
-    if (other_stays) shell_.rebase(j, -f);
+    const Vec3 f = bed_.contacts.force_on_first(i, k);
+    if (stays) bed_.shell.rebase(i, f);
+    if (other_stays) bed_.shell.rebase(j, -f);
   });
   thawed_.clear();
 }

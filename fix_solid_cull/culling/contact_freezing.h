@@ -6,14 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "atom_index.h"
-#include "body_groups.h"
+#include "bed.h"
 #include "flat_map.h"
-#include "ports.h"
 #include "proposal.h"
-#include "scales.h"
-#include "shell.h"
-#include "solid.h"
 
 namespace solidcull {
 
@@ -27,9 +22,7 @@ struct Changes {
 /// Local, but for freeze_between_merged().
 class ContactFreezing {
  public:
-  ContactFreezing(const Ports& ports, const Scales& scales, Solid& solid, Shell& shell, const AtomIndex& index,
-                  BodyGroups& groups)
-      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), index_(index), groups_(groups) {}
+  explicit ContactFreezing(Bed& bed) : bed_(bed) {}
 
   /// Contacts of what is to be freed go back to the engine. Whatever they are given to must be an atom by now.
   void thaw(const Changes& changes);
@@ -52,12 +45,7 @@ class ContactFreezing {
 
   void count_energy_of_new_contacts() const;
 
-  const Ports& ports_;
-  const Scales& scales_;
-  Solid& solid_;
-  Shell& shell_;
-  const AtomIndex& index_;
-  BodyGroups& groups_;
+  Bed& bed_;
   FlatMap<char> thawed_;  // granules that were freed in the last change, here or near
   TagPairs kept_;         // with `restore refill`: contacts of theirs that have a history, lower tag first
 };

@@ -19,24 +19,24 @@ constexpr double wall_closes = 0.2;
 void Cover::make_surface() {
   if (surface_) return;
   surface_ = std::make_unique<ImplicitSurface>(
-      scales_.voxel(), scales_.closing(),
+      bed_.scales.voxel(), bed_.scales.closing(),
       [this](const Vec3& lo, const Vec3& hi, const std::function<void(const Sphere&)>& visit) { gather(lo, hi, visit); });
 }
 
 /// All spheres that may overlap the box, which is the observer's.
 void Cover::gather(const Vec3& lo, const Vec3& hi, const std::function<void(const Sphere&)>& visit) const {
   for (const SphereCells* cells : {&around_, &plug_cells_}) {
-    const Vec3 reach = Vec3::Constant(cells->largest_radius() + scales_.closing());
+    const Vec3 reach = Vec3::Constant(cells->largest_radius() + bed_.scales.closing());
     cells->for_each_in_box(lo - reach, hi + reach, [&](std::size_t, const Sphere& s) {
       visit(s);
       return true;
     });
   }
   const Vec3 middle = observer_.to_world(0.5 * (lo + hi));
-  const Vec3 half =
-      turned_half_box(observer_.turn(), 0.5 * (hi - lo) + Vec3::Constant(solid_.store().largest_radius() + scales_.closing()));
-  stored_.for_each_in_box(middle - half, middle + half, [&](const Resident& g) {
-    visit({observer_.to_frame(solid_.nearest_image(solid_.in_world(g), middle)), g.radius});
+  const Vec3 half = turned_half_box(
+      observer_.turn(), 0.5 * (hi - lo) + Vec3::Constant(bed_.solid.store().largest_radius() + bed_.scales.closing()));
+  bed_.stored.for_each_in_box(middle - half, middle + half, [&](const Resident& g) {
+    visit({observer_.to_frame(bed_.solid.nearest_image(bed_.solid.in_world(g), middle)), g.radius});
   });
 }
 
@@ -57,10 +57,10 @@ void Cover::begin_run(bool a_wall_has_gone) {
 }
 
 void Cover::plug(const WallContact& c, const Vec3& at, const Vec3& outward, FlatMap<Sphere>& moving) {
-  const double radius = 0.5 * (scales_.depth() + scales_.closing()) + scales_.diameter();
+  const double radius = 0.5 * (bed_.scales.depth() + bed_.scales.closing()) + bed_.scales.diameter();
   constexpr int bits = 19;  // of a place along an axis; what is 2^18 diameters away may have the same
   const auto grid = [&](double x) {
-    const auto cell = static_cast<std::int64_t>(std::floor(x / (0.5 * scales_.diameter())));
+    const auto cell = static_cast<std::int64_t>(std::floor(x / (0.5 * bed_.scales.diameter())));
     return static_cast<std::uint64_t>(cell) & ((std::uint64_t{1} << bits) - 1);
   };
   // a thin plate has one on either side
@@ -88,11 +88,11 @@ void Cover::close_behind_walls(const std::vector<WallContact>& contacts, const s
   FlatMap<Sphere> moving;
   for (const WallContact& c : contacts) {
     const int i = c.granule;
-    if (scales_.settings().walls == WallCover::surface || c.gap > wall_closes * ports_.atoms.radius[i]) continue;
-    if (c.moving && !shell_[i].locked && !rests(i)) continue;
+    if (bed_.scales.settings().walls == WallCover::surface || c.gap > wall_closes * bed_.atoms.radius[i]) continue;
+    if (c.moving && !bed_.shell[i].locked && !rests(i)) continue;
     const double distance = c.to_wall.norm();
     if (distance == 0) continue;
-    Vec3 at = ports_.atoms.place(i) + c.to_wall, outward = c.to_wall / distance;
+    Vec3 at = bed_.atoms.place(i) + c.to_wall, outward = c.to_wall / distance;
     if (c.moving) {
       at = observer_.to_frame(at);
       outward = observer_.turned_to_frame(outward);
@@ -110,12 +110,12 @@ void Cover::close_behind_walls(const std::vector<WallContact>& contacts, const s
 // ------------------------------------------------------------------------------------------------------------ drawing
 
 void Cover::follow_largest_body() {
-  if (!scales_.rigid() || ports_.run.any_periodic()) return;
-  const GranuleStore& store = solid_.store();
+  if (!bed_.scales.rigid() || bed_.run.any_periodic()) return;
+  const GranuleStore& store = bed_.solid.store();
   int largest = 0;
   std::int64_t count = 0;
   store.for_each_body([&](int body, const Vec3&, const Vec3&) {
-    const std::int64_t n = solid_.bodies().body(body).mass.count;
+    const std::int64_t n = bed_.solid.bodies().body(body).mass.count;
     if (body == observed_) largest = body, count = 2 * n;  // it stays until another one is twice as large
     if (n > count) largest = body, count = n;
   });
@@ -125,21 +125,21 @@ void Cover::follow_largest_body() {
   }
   if (largest != observed_) {
     observed_ = largest;
-    observed_then_ = solid_.bodies().pose(largest);
+    observed_then_ = bed_.solid.bodies().pose(largest);
     return;
   }
-  const Pose& now = solid_.bodies().pose(observed_);
+  const Pose& now = bed_.solid.bodies().pose(observed_);
   double way = 0;
   store.for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
     if (body == observed_) way = largest_way(observed_then_, now, lo, hi);
   });
-  if (way <= drawn_share * scales_.voxel()) return;
+  if (way <= drawn_share * bed_.scales.voxel()) return;
   const Pose before = observer_;
   const Eigen::Quaterniond turn = now.quaternion() * observed_then_.quaternion().conjugate();
   observer_ =
       Pose(now.origin() + turn * (observer_.origin() - observed_then_.origin()), (turn * observer_.quaternion()).normalized());
   observed_then_ = now;
-  if (ports_.ranks.has_neighbours()) surface_->touch_all();
+  if (bed_.ranks.has_neighbours()) surface_->touch_all();
   for (const Sphere& plug : plugs_)
     for (const Pose* pose : {&before, const_cast<const Pose*>(&observer_)})
       surface_->touch({pose->to_frame(plug.centre), plug.radius});
@@ -148,24 +148,24 @@ void Cover::follow_largest_body() {
 
 /// Over all ranks.
 std::int64_t Cover::atoms_and_stored(bool drawn_only) const {
-  std::int64_t n = static_cast<std::int64_t>(solid_.store().size());
-  for (int i = 0; i < ports_.atoms.owned; ++i) n += !drawn_only || rows_[i].drawn;
-  ports_.ranks.sum(&n, 1);
+  std::int64_t n = static_cast<std::int64_t>(bed_.solid.store().size());
+  for (int i = 0; i < bed_.atoms.owned; ++i) n += !drawn_only || rows_[i].drawn;
+  bed_.ranks.sum(&n, 1);
   return n;
 }
 
 void Cover::draw_atoms(double moved, std::vector<Sphere>& spheres) {
-  const bool shared = ports_.ranks.has_neighbours();
-  for (int i = 0; i < ports_.atoms.owned; ++i) {
+  const bool shared = bed_.ranks.has_neighbours();
+  for (int i = 0; i < bed_.atoms.owned; ++i) {
     Drawn& d = rows_[i];
-    const Vec3 x = ports_.atoms.place(i);
-    const Sphere s{observer_.to_frame(x), ports_.atoms.radius[i]};
+    const Vec3 x = bed_.atoms.place(i);
+    const Sphere s{observer_.to_frame(x), bed_.atoms.radius[i]};
     spheres.push_back(s);
     Vec3 from = x;
     if (!d.drawn || (s.centre - d.at).squaredNorm() > moved * moved) {
       if (d.drawn) surface_->touch({d.at, s.radius});
       surface_->touch(s);
-      from = d.drawn ? observer_.to_world(d.at) : Vec3(x + Vec3::Constant(scales_.diameter()));
+      from = d.drawn ? observer_.to_world(d.at) : Vec3(x + Vec3::Constant(bed_.scales.diameter()));
       d.drawn = true;
       d.at = s.centre;
     }
@@ -175,8 +175,8 @@ void Cover::draw_atoms(double moved, std::vector<Sphere>& spheres) {
 
 /// Interior granules of bodies that move against the observer.
 void Cover::draw_bodies(double moved) {
-  solid_.store().for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
-    const Pose& pose = solid_.bodies().pose(body);
+  bed_.solid.store().for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
+    const Pose& pose = bed_.solid.bodies().pose(body);
     const Eigen::Quaterniond back = observer_.quaternion().conjugate();
     const Pose seen(observer_.to_frame(pose.origin()), back * pose.quaternion());
     const auto then = drawn_bodies_.find(body);
@@ -185,7 +185,7 @@ void Cover::draw_bodies(double moved) {
       return;
     }
     if (largest_way(then->second, seen, lo, hi) <= moved) return;
-    solid_.store().for_each_in_box(body, lo, hi, [&](const Resident& g) {
+    bed_.solid.store().for_each_in_box(body, lo, hi, [&](const Resident& g) {
       surface_->touch({then->second.to_world(g.position), g.radius});
       surface_->touch({seen.to_world(g.position), g.radius});
     });
@@ -195,13 +195,13 @@ void Cover::draw_bodies(double moved) {
 
 /// What other ranks and periodic images have near this rank, and the other way.
 void Cover::draw_neighbours(std::vector<Sphere>& spheres) {
-  if (!ports_.ranks.has_neighbours()) return;
-  solid_.store().for_each([&](const Resident& g) {
-    to_neighbours_.push_back({triple(solid_.in_world(g)), g.radius, triple(Vec3::Zero())});
+  if (!bed_.ranks.has_neighbours()) return;
+  bed_.solid.store().for_each([&](const Resident& g) {
+    to_neighbours_.push_back({triple(bed_.solid.in_world(g)), g.radius, triple(Vec3::Zero())});
   });
   // how far a granule can change another one's depth
-  const double reach = scales_.depth() + 2 * scales_.closing() + 0.5 * contact_reach(ports_, solid_);
-  for (const Row& r : ports_.ranks.exchange(to_neighbours_, reach)) {
+  const double reach = bed_.scales.depth() + 2 * bed_.scales.closing() + 0.5 * contact_reach(bed_);
+  for (const Row& r : bed_.ranks.exchange(to_neighbours_, reach)) {
     const Sphere s{observer_.to_frame(vec(r.at)), r.radius};
     const Vec3 step = observer_.turned_to_frame(vec(r.step));
     spheres.push_back(s);
@@ -216,7 +216,7 @@ void Cover::draw_neighbours(std::vector<Sphere>& spheres) {
 void Cover::draw() {
   make_surface();
   follow_largest_body();
-  const double moved = drawn_share * scales_.voxel();
+  const double moved = drawn_share * bed_.scales.voxel();
   // a granule that was drawn and is neither an atom nor stored any more has left the simulation
   if (atoms_and_stored(true) < drawn_at_last_look_) surface_->touch_all();
   std::vector<Sphere> spheres;
@@ -224,12 +224,12 @@ void Cover::draw() {
   draw_bodies(moved);
   draw_neighbours(spheres);
   drawn_at_last_look_ = atoms_and_stored(false);
-  around_.build(std::move(spheres), 2 * scales_.diameter());
+  around_.build(std::move(spheres), 2 * bed_.scales.diameter());
   if (!plugs_changed_) return;
   std::vector<Sphere> plugs;
   for (const Sphere& p : plugs_) plugs.push_back({observer_.to_frame(p.centre), p.radius});
   moving_plugs_.for_each([&](std::int64_t, const Sphere& p) { plugs.push_back(p); });
-  plug_cells_.build(std::move(plugs), 4 * scales_.diameter());
+  plug_cells_.build(std::move(plugs), 4 * bed_.scales.diameter());
   plugs_changed_ = false;
 }
 
@@ -237,18 +237,19 @@ void Cover::draw() {
 
 bool Cover::is_deep(int i) {
   Drawn& d = rows_[i];
-  d.nearest_void = surface_->void_within(observer_.to_frame(ports_.atoms.place(i)), scales_.depth(), d.nearest_void);
+  d.nearest_void = surface_->void_within(observer_.to_frame(bed_.atoms.place(i)), bed_.scales.depth(), d.nearest_void);
   return d.nearest_void.none();
 }
 
 void Cover::wake_exposed() {
-  const double depth = (scales_.settings().depth - std::min(cover_slack, 0.5 * scales_.settings().depth)) * scales_.diameter();
+  const double depth =
+      (bed_.scales.settings().depth - std::min(cover_slack, 0.5 * bed_.scales.settings().depth)) * bed_.scales.diameter();
   for (const int i : motion_.interface_atoms()) {
     Drawn& d = rows_[i];
-    const Vec3 x = observer_.to_frame(ports_.atoms.place(i));
-    if (!surface_->touched_near(x, depth + scales_.closing())) continue;
+    const Vec3 x = observer_.to_frame(bed_.atoms.place(i));
+    if (!surface_->touched_near(x, depth + bed_.scales.closing())) continue;
     d.nearest_void = surface_->void_within(x, depth, d.nearest_void);
-    if (!d.nearest_void.none()) wake_.ask(ports_.atoms.place(i), 0.5 * ports_.atoms.radius[i]);
+    if (!d.nearest_void.none()) wake_.ask(bed_.atoms.place(i), 0.5 * bed_.atoms.radius[i]);
   }
   surface_->clear_touched();
 }

@@ -8,14 +8,12 @@
 #include <memory>
 #include <vector>
 
+#include "bed.h"
 #include "body_motion.h"
 #include "flat_map.h"
 #include "implicit_surface.h"
 #include "per_granule.h"
-#include "ports.h"
-#include "solid.h"
 #include "sphere_cells.h"
-#include "stored_search.h"
 #include "wake_requests.h"
 
 namespace solidcull {
@@ -43,9 +41,7 @@ struct Drawn {
 /// leaves it as it is. Walls are no surface (`walls closed`): plugs behind them close it. m.
 class Cover : public BodyFollower {
  public:
-  Cover(const Ports& ports, const Scales& scales, const Solid& solid, const Shell& shell, const BodyMotion& motion,
-        const StoredSearch& stored, WakeRequests& wake)
-      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), motion_(motion), stored_(stored), wake_(wake) {}
+  Cover(const Bed& bed, const BodyMotion& motion, WakeRequests& wake) : bed_(bed), motion_(motion), wake_(wake) {}
 
   PerGranule<Drawn>& rows() { return rows_; }
   /// The surface does not care who holds a granule: it has come out of the store.
@@ -97,12 +93,8 @@ class Cover : public BodyFollower {
     Triple step;
   };
 
-  const Ports& ports_;
-  const Scales& scales_;
-  const Solid& solid_;
-  const Shell& shell_;
+  const Bed& bed_;
   const BodyMotion& motion_;
-  const StoredSearch& stored_;
   WakeRequests& wake_;
 
   PerGranule<Drawn> rows_;

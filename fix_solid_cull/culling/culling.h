@@ -32,7 +32,7 @@ class Culling {
   void lists_are_new() { inner_pairs_listed_ = true; }  ///< local
   void leave_out_inner_pairs();                         ///< local
   /// In a step nothing is culled on any rank: initial_step(), integrate() and finish_step() would do nothing. Local.
-  bool idles() const { return phase_ == Phase::stepping && !p_.census.something_locked(); }
+  bool idles() const { return phase_ == Phase::stepping && !p_.bed.census.something_locked(); }
   bool may_ask_for_wall_loads() const;  ///< of the forces that are computed next. Local
   void take_forces();                   ///< after all forces: loads, wake-ups, a look
   void finish_step();                   ///< bodies have their velocities. Local
@@ -68,13 +68,13 @@ class Culling {
   std::int64_t restore_all();
 
   // --- state
-  double value(int n) { return p_.report.value(n); }          ///< f_ID[n + 1]
-  const std::map<int, InterfaceMesh>& interface_meshes();     ///< by body; between runs, as the last run left them. Local
-  std::int64_t stored() const { return p_.census.stored(); }  ///< interior granules of all ranks. Local
-  double largest_radius(int type) const;                      ///< of what is or was stored (m). Local
-  void enclose_stored(Box& box) const;                        ///< the box must not be smaller. Local
-  double memory_bytes() const;                                ///< local
-  std::vector<double> restart_state();                        ///< on rank 0; the first number is how many
+  double value(int n) { return p_.report.value(n); }              ///< f_ID[n + 1]
+  const std::map<int, InterfaceMesh>& interface_meshes();         ///< by body; between runs, as the last run left them. Local
+  std::int64_t stored() const { return p_.bed.census.stored(); }  ///< interior granules of all ranks. Local
+  double largest_radius(int type) const;                          ///< of what is or was stored (m). Local
+  void enclose_stored(Box& box) const;                            ///< the box must not be smaller. Local
+  double memory_bytes() const;                                    ///< local
+  std::vector<double> restart_state();                            ///< on rank 0; the first number is how many
   /// What goes with the state of a restart file, at the end of the file.
   void append_restart(const std::string& file) { p_.snapshot.append_to(file); }
   /// file: what the state was read from.
@@ -82,10 +82,10 @@ class Culling {
 
   // --- what follows the engine's atoms; local
   const std::vector<FollowsAtoms*>& followers() { return p_.followers; }
-  void arrived_from_another_rank(int i) { p_.shell.is_arriving(i); }
+  void arrived_from_another_rank(int i) { p_.bed.shell.is_arriving(i); }
   void was_made(int i) { p_.closure.was_made(i); }  ///< by a fix that inserts, or any other way
   void read_from_file(int i) { p_.cover.forget(i); }
-  double* labels() { return p_.shell.labels(); }
+  double* labels() { return p_.bed.shell.labels(); }
 
  private:
   enum class Phase {

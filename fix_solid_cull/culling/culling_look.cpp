@@ -9,51 +9,51 @@ namespace solidcull {
 
 void Culling::see_walls(bool new_run) {
   if (new_run) p_.cover.begin_run(p_.walls.a_wall_has_gone());
-  const std::vector<WallContact> contacts = p_.ports.walls.contacts();
-  if (p_.scales.needs_surface()) p_.cover.close_behind_walls(contacts, [&](int i) { return p_.survey[i].calm > 0; });
+  const std::vector<WallContact> contacts = p_.bed.walls.contacts();
+  if (p_.bed.scales.needs_surface()) p_.cover.close_behind_walls(contacts, [&](int i) { return p_.survey[i].calm > 0; });
   p_.walls.update(contacts, new_run);
 }
 
 void Culling::look() {
   const auto timed = p_.report.time(Part::look);
-  const std::int64_t step = p_.ports.run.step;
-  check_numbers(p_.ports.atoms);
-  const bool any_culled = p_.ports.ranks.any(!p_.motion.interface_atoms().empty() || p_.solid.store().size() > 0);
+  const std::int64_t step = p_.bed.run.step;
+  check_numbers(p_.bed.atoms);
+  const bool any_culled = p_.bed.ranks.any(!p_.motion.interface_atoms().empty() || p_.bed.solid.store().size() > 0);
   p_.gravity.watch();
-  std::int64_t in_bodies[2] = {0, static_cast<std::int64_t>(p_.solid.locked())};
-  for (const auto& [number, body] : p_.solid.bodies().bodies())
-    if (p_.wake.asks_body(p_.groups.key_of(number))) in_bodies[0] += body.mass.count;
-  p_.ports.ranks.sum(in_bodies, 2);
+  std::int64_t in_bodies[2] = {0, static_cast<std::int64_t>(p_.bed.solid.locked())};
+  for (const auto& [number, body] : p_.bed.solid.bodies().bodies())
+    if (p_.wake.asks_body(p_.bed.groups.key_of(number))) in_bodies[0] += body.mass.count;
+  p_.bed.ranks.sum(in_bodies, 2);
   p_.pacing.see_waking_bodies(in_bodies[0], in_bodies[1], step);
   if (p_.pacing.waits_for_calm(step)) p_.pacing.see_energy(p_.survey.kinetic_energy_of_exterior(), step);
   const bool may_cull = p_.pacing.may_cull(step) && !p_.gravity.turns();
   if (may_cull || any_culled) see_walls(false);
   proposal_ = survey(may_cull, any_culled);
   judge(may_cull, proposal_);
-  p_.pacing.schedule(step, p_.census.something_locked(), p_.census.something_stored());
+  p_.pacing.schedule(step, p_.bed.census.something_locked(), p_.bed.census.something_stored());
 }
 
 /// Before the first step of a run in which nothing is culled. What the deck has tilted since the last one begins to move now.
 void Culling::look_at_once() {
   const auto timed = p_.report.time(Part::look);
-  check_numbers(p_.ports.atoms);
+  check_numbers(p_.bed.atoms);
   if (!p_.gravity.turns()) proposal_ = survey(true, false);
   p_.pacing.has_looked_at_once();
-  if (p_.ports.ranks.any(!proposal_.chosen.empty())) ask_for_build(p_.ports.run.step);
+  if (p_.bed.ranks.any(!proposal_.chosen.empty())) ask_for_build(p_.bed.run.step);
 }
 
 /// What is to be culled; what is exposed, or stands at walls that hold it, is seen on the way.
 Proposal Culling::survey(bool may_cull, bool any_culled) {
-  const Patience patience = p_.pacing.patience(p_.census.something_locked());
+  const Patience patience = p_.pacing.patience(p_.bed.census.something_locked());
   surface_drawn_ = false;
   Proposal proposal;
-  std::int64_t candidates[2] = {0, p_.ports.atoms.owned};  // of so many
+  std::int64_t candidates[2] = {0, p_.bed.atoms.owned};  // of so many
   if (may_cull)
     candidates[0] = p_.survey.find_calm(patience, proposal);
   else
     p_.survey.forget_calm();
-  p_.ports.ranks.sum(candidates, 2);
-  const bool live = p_.scales.needs_surface();
+  p_.bed.ranks.sum(candidates, 2);
+  const bool live = p_.bed.scales.needs_surface();
   const double few = (live ? Pacing::worth_share : Pacing::worth_watching) * static_cast<double>(candidates[1]);
   const bool some_candidates = candidates[0] > 0 && static_cast<double>(candidates[0]) >= few;
   if (!some_candidates && !any_culled) {
@@ -70,31 +70,31 @@ Proposal Culling::survey(bool may_cull, bool any_culled) {
     p_.survey.leave_out_unsteady(patience, proposal);
     p_.cover.wake_exposed();
   }
-  if (p_.ports.ranks.any(!proposal.chosen.empty())) p_.survey.tie(proposal);
+  if (p_.bed.ranks.any(!proposal.chosen.empty())) p_.survey.tie(proposal);
   return proposal;
 }
 
 void Culling::ground_and_press() {
-  if (!p_.scales.rigid()) {
+  if (!p_.bed.scales.rigid()) {
     p_.grounding.share_out_loads();
     return;
   }
   p_.grounding.update();
-  if (p_.ports.ranks.any(p_.motion.stale())) {
-    p_.index.index(p_.ports.atoms);  // they were sorted since membership changed
-    p_.groups.settle();
+  if (p_.bed.ranks.any(p_.motion.stale())) {
+    p_.bed.index.index(p_.bed.atoms);  // they were sorted since membership changed
+    p_.bed.groups.settle();
     p_.motion.refresh_in_step();
     p_.motion.give_velocities();
   }
   p_.grounding.share_out_loads();
   const bool asked = p_.closure.ask_to_store(p_.motion.interface_atoms());
-  if (p_.ports.ranks.any(p_.grounding.lets_go() || asked)) ask_for_build(p_.ports.run.step + 1);
+  if (p_.bed.ranks.any(p_.grounding.lets_go() || asked)) ask_for_build(p_.bed.run.step + 1);
 }
 
 /// Is it worth a rebuild of the neighbour lists, and did culling pay since the last look?
 void Culling::judge(bool may_cull, const Proposal& proposal) {
-  const std::int64_t step = p_.ports.run.step, restored = p_.solid.ledger().granules_restored();
-  const Ranks& ranks = p_.ports.ranks;
+  const std::int64_t step = p_.bed.run.step, restored = p_.bed.solid.ledger().granules_restored();
+  const Ranks& ranks = p_.bed.ranks;
   std::int64_t counts[3] = {static_cast<std::int64_t>(proposal.chosen.size()), p_.survey.exterior_here(),
                             static_cast<std::int64_t>(proposal.overdue_tags.size())};
   ranks.sum(counts, 3);
@@ -109,7 +109,7 @@ void Culling::judge(bool may_cull, const Proposal& proposal) {
     return;
   }
   std::int64_t work[4] = {static_cast<std::int64_t>(p_.motion.interface_atoms().size()),
-                          static_cast<std::int64_t>(p_.solid.store().size()), restored_here, p_.ports.atoms.owned};
+                          static_cast<std::int64_t>(p_.bed.solid.store().size()), restored_here, p_.bed.atoms.owned};
   ranks.sum(work, 4);
   const Pacing::Verdict verdict = p_.pacing.judge({work[0], work[1], work[3], work[2], chosen, exterior, surface_drawn_}, step);
   if (verdict.wait == 0) return;
@@ -119,8 +119,8 @@ void Culling::judge(bool may_cull, const Proposal& proposal) {
     ask_for_build(step + 1);
   }
   if (verdict.tell)
-    p_.ports.run.say("among " + std::to_string(exterior) + " granules too few can be culled for it to pay; trying again every " +
-                     std::to_string(verdict.wait * p_.scales.look_every()) + " steps or more");
+    p_.bed.run.say("among " + std::to_string(exterior) + " granules too few can be culled for it to pay; trying again every " +
+                   std::to_string(verdict.wait * p_.bed.scales.look_every()) + " steps or more");
 }
 
 }  // namespace solidcull

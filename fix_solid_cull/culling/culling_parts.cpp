@@ -5,39 +5,31 @@
 namespace solidcull {
 
 CullingParts::CullingParts(const Ports& engine, const Settings& settings, int types)
-    : ports(engine),
-      scales(settings),
-      solid(scales),
-      shell(solid.bodies()),
-      stored(solid, ports.ranks, scales),
-      masses(solid, ports.atoms, shell, index, arrivals),
-      groups(ports, scales, solid, shell, stored, masses, arrivals),
-      census(ports, solid),
-      motion(ports, scales, solid, shell, groups),
-      gravity(ports, scales, solid, motion, groups, wake),
-      walls(ports, shell, wake),
-      grounding(ports, scales, solid, shell, groups, motion, walls),
-      cover(ports, scales, solid, shell, motion, stored, wake),
-      survey(ports, scales, solid, shell, motion, groups, walls),
-      pacing(scales),
-      exchange(ports, scales, solid, shell, index, walls, cover, grounding),
-      refill(ports, scales, solid, shell, index, exchange, stored),
-      closure(ports, scales, solid, shell, groups, stored, census, walls, exchange),
-      freezing(ports, scales, solid, shell, index, groups),
-      parcels(ports, scales, solid, shell, index, masses, arrivals, groups, cover),
-      handover(ports, solid, shell, index, masses, parcels, groups, stored, arrivals),
-      lost(ports, solid, shell, index, masses),
-      snapshot(ports, scales, solid, shell, index, parcels, gravity, cover),
-      shown(ports, scales, solid, shell, index, groups, wake),
-      meshes(ports, scales, solid, shell, index, masses, shown),
-      claims(ports, scales, solid, shell, wake),
-      report(ports, solid, shell, groups, motion),
-      files(ports, scales, solid, shell, groups, meshes, report),
-      invariants(ports, scales, solid, shell, groups, stored, census),
-      followers{&shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown} {
-  solid.set_types(types);
+    : bed(engine, settings, types),
+      motion(bed),
+      gravity(bed, motion, wake),
+      walls(bed, wake),
+      grounding(bed, motion, walls),
+      cover(bed, motion, wake),
+      survey(bed, motion, walls),
+      pacing(bed.scales),
+      exchange(bed, walls, cover, grounding),
+      refill(bed, exchange),
+      closure(bed, walls, exchange),
+      freezing(bed),
+      parcels(bed, cover),
+      handover(bed, parcels),
+      lost(bed),
+      snapshot(bed, parcels, gravity, cover),
+      shown(bed, wake),
+      meshes(bed, shown),
+      claims(bed, wake),
+      report(bed, motion),
+      files(bed, meshes, report),
+      invariants(bed),
+      followers{&bed.shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown} {
   for (BodyFollower* f : std::initializer_list<BodyFollower*>{&motion, &grounding, &closure, &handover, &cover, &meshes})
-    solid.followed_by(*f);
+    bed.solid.followed_by(*f);
 }
 
 }  // namespace solidcull

@@ -3,16 +3,13 @@
 
 #include <vector>
 
-#include "atom_index.h"
-#include "body_groups.h"
+#include "bed.h"
 #include "body_meshes.h"
 #include "body_motion.h"
-#include "census.h"
 #include "contact_freezing.h"
 #include "cover.h"
 #include "deck_claims.h"
 #include "effective_gravity.h"
-#include "granule_masses.h"
 #include "grounding.h"
 #include "handover.h"
 #include "invariants.h"
@@ -21,17 +18,12 @@
 #include "output_files.h"
 #include "pacing.h"
 #include "parcels.h"
-#include "ports.h"
 #include "refill.h"
 #include "report.h"
-#include "scales.h"
-#include "shell.h"
 #include "shell_closure.h"
 #include "shown_bed.h"
 #include "snapshot.h"
-#include "solid.h"
 #include "store_exchange.h"
-#include "stored_search.h"
 #include "survey.h"
 #include "wake_requests.h"
 #include "wall_survey.h"
@@ -44,22 +36,9 @@ struct CullingParts {
   CullingParts(const Ports& engine, const Settings& settings, int types);
   CullingParts(const CullingParts&) = delete;
   /// What a membership change works on.
-  MembershipChange::Parts for_change() {
-    return {ports, scales, solid, shell, index, masses, arrivals, groups, walls, survey, stored, exchange, closure, freezing};
-  }
+  MembershipChange::Parts for_change() { return {bed, survey, exchange, closure, freezing}; }
 
-  const Ports ports;
-  Scales scales;
-
-  // what is culled, and where it is
-  Solid solid;
-  Shell shell;
-  AtomIndex index;
-  Arrivals arrivals;
-  StoredSearch stored;
-  GranuleMasses masses;
-  BodyGroups groups;
-  Census census;
+  Bed bed;
 
   // what is seen and asked
   WakeRequests wake;

@@ -12,25 +12,25 @@ constexpr double steps_per_granule = 10;
 }  // namespace
 
 void EffectiveGravity::watch_bodies(bool at_once) {
-  const Vec3 g = ports_.run.gravity();
+  const Vec3 g = bed_.run.gravity();
   if (g != gravity_then_)  // what stands still feels gravity alone
-    for (const auto& [number, b] : solid_.bodies().bodies())
-      if (b.grounded && scales_.wake_up().gravity_changed(b.pose.turned_to_frame(g), b.felt_known ? b.felt : gravity_then_,
-                                                          static_cast<double>(b.mass.count), turns_))
-        wake_.ask_body(groups_.key_of(number));
+    for (const auto& [number, b] : bed_.solid.bodies().bodies())
+      if (b.grounded && bed_.scales.wake_up().gravity_changed(b.pose.turned_to_frame(g), b.felt_known ? b.felt : gravity_then_,
+                                                              static_cast<double>(b.mass.count), turns_))
+        wake_.ask_body(bed_.groups.key_of(number));
   for (const ActiveBody& a : motion_.active()) watch(a, g, at_once);
 }
 
 /// The mean acceleration over the time in which a wave crosses the body is what it feels as a whole.
 void EffectiveGravity::watch(const ActiveBody& a, const Vec3& g, bool at_once) {
-  const WakeUpLaw& law = scales_.wake_up();
-  const std::int64_t now = ports_.run.step;
+  const WakeUpLaw& law = bed_.scales.wake_up();
+  const std::int64_t now = bed_.run.step;
   SolidBody& b = *a.body;
-  const double granules = (scales_.rigid() ? b.motion.mass() : b.mass.mass) * static_cast<double>(b.mass.count) / b.mass.mass;
+  const double granules = (bed_.scales.rigid() ? b.motion.mass() : b.mass.mass) * static_cast<double>(b.mass.count) / b.mass.mass;
   const auto wakes_if = [&](bool changed) {
-    if (changed) wake_.ask_body(groups_.key_of(a.number));
+    if (changed) wake_.ask_body(bed_.groups.key_of(a.number));
   };
-  if (!scales_.rigid()) {
+  if (!bed_.scales.rigid()) {
     b.feel_first(g);
     wakes_if(law.gravity_changed(g, b.felt, granules, turns_));
     return;
@@ -48,10 +48,10 @@ void EffectiveGravity::watch(const ActiveBody& a, const Vec3& g, bool at_once) {
     b.begin_window(now);
     return;
   }
-  const double window = std::max<double>(scales_.look_every(), steps_per_granule * std::cbrt(granules));
+  const double window = std::max<double>(bed_.scales.look_every(), steps_per_granule * std::cbrt(granules));
   const double steps = static_cast<double>(now - b.step_then);
   if (steps < window) return;
-  b.end_window(steps * ports_.run.dt);
+  b.end_window(steps * bed_.run.dt);
   const Vec3 feels = b.pose.turned_to_frame(g - b.acceleration);
   wakes_if(b.felt_known && law.gravity_changed(feels, b.felt, granules, turns_));
   b.feel_first(feels);

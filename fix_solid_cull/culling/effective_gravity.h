@@ -1,10 +1,8 @@
 // What a body feels as a whole: gravity less its own acceleration, in its own frame (DESIGN section 8).
 #pragma once
 
-#include "body_groups.h"
+#include "bed.h"
 #include "body_motion.h"
-#include "ports.h"
-#include "solid.h"
 #include "wake_requests.h"
 
 namespace solidcull {
@@ -12,21 +10,19 @@ namespace solidcull {
 /// Asks for bodies to wake that are tilted, shaken or let fall. Local.
 class EffectiveGravity {
  public:
-  EffectiveGravity(const Ports& ports, const Scales& scales, Solid& solid, const BodyMotion& motion, const BodyGroups& groups,
-                   WakeRequests& wake)
-      : ports_(ports), scales_(scales), solid_(solid), motion_(motion), groups_(groups), wake_(wake) {}
+  EffectiveGravity(Bed& bed, const BodyMotion& motion, WakeRequests& wake) : bed_(bed), motion_(motion), wake_(wake) {}
 
   /// At each look.
   void watch() {
     see_turn();
     watch_bodies(false);
-    gravity_then_ = ports_.run.gravity();
+    gravity_then_ = bed_.run.gravity();
   }
   /// At the start of a run: the deck may have changed gravity, all at once.
   void begin_run() {
     see_turn();
-    if (ports_.run.gravity() != gravity_then_) watch_bodies(true);
-    gravity_then_ = ports_.run.gravity();
+    if (bed_.run.gravity() != gravity_then_) watch_bodies(true);
+    gravity_then_ = bed_.run.gravity();
   }
   /// The deck's gravity had another direction at the last look. A bed that is tilted yields in many small slips, each slow at
   /// first: none of it is solid until the tilting ends.
@@ -38,17 +34,14 @@ class EffectiveGravity {
   static constexpr double same_direction = 1e-9;  // sine
 
   void see_turn() {
-    const Vec3 g = ports_.run.gravity();
+    const Vec3 g = bed_.run.gravity();
     turns_ = g.cross(gravity_then_).norm() > same_direction * g.norm() * gravity_then_.norm();
   }
   void watch_bodies(bool at_once);
   void watch(const ActiveBody& a, const Vec3& g, bool at_once);
 
-  const Ports& ports_;
-  const Scales& scales_;
-  Solid& solid_;
+  Bed& bed_;
   const BodyMotion& motion_;
-  const BodyGroups& groups_;
   WakeRequests& wake_;
   Vec3 gravity_then_ = Vec3::Zero();  // at the last look
   bool turns_ = false;

@@ -3,56 +3,38 @@
 
 #include <cstdint>
 
-#include "atom_index.h"
-#include "flat_map.h"
-#include "shell.h"
-#include "solid.h"
+#include "bed_state.h"
 
 namespace solidcull {
-
-/// An interface granule that another rank has announced in this reneighbouring; the engine brings its atom.
-struct Arrival {
-  SolidBodies::Place at;
-  double mass = 0, radius = 0;
-  bool held = false;
-};
-using Arrivals = FlatMap<Arrival>;
-
-/// One that the engine does not have any more, and its body has still; in the frame of that.
-struct LostGranule {
-  std::int64_t tag;
-  GranuleMass granule;
-};
 
 /// Local.
 class GranuleMasses {
  public:
-  GranuleMasses(const Solid& solid, const Atoms& atoms, const Shell& shell, const AtomIndex& index, const Arrivals& arrivals)
-      : solid_(solid), atoms_(atoms), shell_(shell), index_(index), arrivals_(arrivals) {}
+  explicit GranuleMasses(const BedState& bed) : bed_(bed) {}
 
   /// In the frame of its present body. std::exception for a tag that is not there.
   GranuleMass operator()(std::int64_t tag) const {
     GranuleMass m;
     int stands_in = 0;
-    const bool stored = solid_.store().contains(tag);
-    const int* i = stored ? nullptr : index_.find(tag);
+    const bool stored = bed_.solid.store().contains(tag);
+    const int* i = stored ? nullptr : bed_.index.find(tag);
     if (stored) {
-      const StoredGranule g = solid_.store().get(tag);
+      const StoredGranule g = bed_.solid.store().get(tag);
       m = {g.mass, g.position, g.radius, g.held};
       stands_in = g.body;
     } else if (i) {
-      const Locked& e = shell_[*i];
-      m = {atoms_.mass[*i], e.place, atoms_.radius[*i], e.held};
+      const Locked& e = bed_.shell[*i];
+      m = {bed_.atoms.mass[*i], e.place, bed_.atoms.radius[*i], e.held};
       stands_in = e.body;
     } else {
-      const Arrival* a = arrivals_.find(tag);
+      const Arrival* a = bed_.arrivals.find(tag);
       if (!a) throw InternalError("granule " + std::to_string(tag) + " is neither an atom nor stored nor announced");
       m = {a->mass, a->at.position, a->radius, a->held};
       stands_in = a->at.body;
     }
-    const int body = solid_.bodies().body_of(tag);
+    const int body = bed_.solid.bodies().body_of(tag);
     if (body && stands_in != body) {
-      const Pose &from = solid_.bodies().pose(stands_in), &to = solid_.bodies().pose(body);
+      const Pose &from = bed_.solid.bodies().pose(stands_in), &to = bed_.solid.bodies().pose(body);
       if (from != to) m.position = to.to_frame(from.to_world(m.position));
     }
     return m;
@@ -62,11 +44,7 @@ class GranuleMasses {
   }
 
  private:
-  const Solid& solid_;
-  const Atoms& atoms_;
-  const Shell& shell_;
-  const AtomIndex& index_;
-  const Arrivals& arrivals_;
+  const BedState& bed_;
 };
 
 }  // namespace solidcull

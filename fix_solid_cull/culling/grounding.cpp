@@ -20,14 +20,14 @@ constexpr double no_load = 1e-6;
 }  // namespace
 
 std::vector<WallLoad> Grounding::wall_loads_on(int i) const {
-  const Locked& e = shell_[i];
-  const double mass = ports_.atoms.mass[i];
-  std::vector<WallLoad> loads = ports_.walls.loads_on(ports_.atoms.tag[i]);
+  const Locked& e = bed_.shell[i];
+  const double mass = bed_.atoms.mass[i];
+  std::vector<WallLoad> loads = bed_.walls.loads_on(bed_.atoms.tag[i]);
   WallLoad rest;
   rest.mesh = WallLoad::no_mesh;
-  rest.force = solid_.bodies().pose(e.body).turned_to_world(e.reference + e.load_change) - mass * ports_.run.gravity();
+  rest.force = bed_.solid.bodies().pose(e.body).turned_to_world(e.reference + e.load_change) - mass * bed_.run.gravity();
   for (const WallLoad& load : loads) rest.force -= load.force;
-  if (rest.force.norm() < no_load * mass * scales_.gravity()) return loads;
+  if (rest.force.norm() < no_load * mass * bed_.scales.gravity()) return loads;
   // walls are not told apart, but by the side from which they push most
   int axis = 0;
   rest.force.cwiseAbs().maxCoeff(&axis);
@@ -54,7 +54,7 @@ void Grounding::forgotten(int body) {
 
 void Grounding::let_go() {
   for (const int body : to_let_go_)
-    if (solid_.exists(body)) solid_.ground(body, false);
+    if (bed_.solid.exists(body)) bed_.solid.ground(body, false);
   to_let_go_.clear();
 }
 
@@ -62,11 +62,11 @@ void Grounding::let_go() {
 
 /// Over all ranks a body that spans them is one: which of its parts touch walls.
 std::set<int> Grounding::keys_of_held_spanning_bodies() const {
-  if (ports_.ranks.count == 1) return {};
+  if (bed_.ranks.count == 1) return {};
   std::vector<int> keys;
-  for (const auto& [number, body] : solid_.bodies().bodies())
-    if (body.mass.held > 0 && groups_.spans(number)) keys.push_back(groups_.key_of(number));
-  keys = ports_.ranks.gather(keys);
+  for (const auto& [number, body] : bed_.solid.bodies().bodies())
+    if (body.mass.held > 0 && bed_.groups.spans(number)) keys.push_back(bed_.groups.key_of(number));
+  keys = bed_.ranks.gather(keys);
   return std::set<int>(keys.begin(), keys.end());
 }
 
@@ -74,21 +74,21 @@ bool Grounding::may_be_let_go(int number, const SolidBody& body, bool held) cons
   if (body.grounded_mass < grounded_share * body.mass.mass) return true;
   const Sum* mean = mean_extra_load_.find(number);
   if (!mean) return !held;
-  const Vec3 g = ports_.run.gravity();
+  const Vec3 g = bed_.run.gravity();
   const Vec3 down = g.norm() > 0 ? Vec3(g.normalized()) : Vec3(Vec3::Zero());
-  const double weight = body.motion.mass() * scales_.gravity(), along = mean->value.dot(down);
+  const double weight = body.motion.mass() * bed_.scales.gravity(), along = mean->value.dot(down);
   const bool holds =
       -along < against_share * weight && (mean->value - along * down).norm() < along_share * (weight + std::max(0.0, along));
   return !held || !holds;
 }
 
 bool Grounding::is_at_rest(const SolidBody& body, const ActiveBody& loads, const int* only_atom) const {
-  const double slow = SolidStateLaw::drift_share * scales_.solid_state().speed;
-  const double size = std::cbrt(static_cast<double>(body.mass.count)) * scales_.diameter();
-  const double balance = Solid::balance_share * body.motion.mass() * scales_.gravity(), turns = body.twist.spin.norm() * size;
+  const double slow = SolidStateLaw::drift_share * bed_.scales.solid_state().speed;
+  const double size = std::cbrt(static_cast<double>(body.mass.count)) * bed_.scales.diameter();
+  const double balance = Solid::balance_share * body.motion.mass() * bed_.scales.gravity(), turns = body.twist.spin.norm() * size;
   // one granule may spin on the spot for ever: nothing brakes it where it touches the wall
   const bool spins_on_the_spot =
-      only_atom && walls_[*only_atom].slip < slow && loads.torque.norm() < balance * ports_.atoms.radius[*only_atom];
+      only_atom && walls_[*only_atom].slip < slow && loads.torque.norm() < balance * bed_.atoms.radius[*only_atom];
   return loads.force.norm() < balance &&
          body.twist.at(body.pose.to_world(body.mass.centre())).norm() + (spins_on_the_spot ? 0.0 : turns) < slow;
 }
@@ -99,9 +99,9 @@ void Grounding::update() {
   for (const ActiveBody& a : motion_.active()) loads[a.number] = &a;
   FlatMap<int> only_atom;  // of bodies of one granule
   for (const int i : motion_.interface_atoms())
-    if (solid_.bodies().body(shell_[i].body).is_one_granule()) only_atom[shell_[i].body] = i;
-  for (auto& [number, body] : solid_.bodies_in_motion()) {
-    const bool held = body.mass.held > 0 || spanning_held.count(groups_.key_of(number));
+    if (bed_.solid.bodies().body(bed_.shell[i].body).is_one_granule()) only_atom[bed_.shell[i].body] = i;
+  for (auto& [number, body] : bed_.solid.bodies_in_motion()) {
+    const bool held = body.mass.held > 0 || spanning_held.count(bed_.groups.key_of(number));
     if (body.grounded) {
       if (may_be_let_go(number, body, held)) to_let_go_.insert(number);
       continue;
@@ -115,42 +115,43 @@ void Grounding::update() {
     if (++looks_at_rest_[number] < looks_to_ground) continue;
     // a body of one granule has moved as the granule alone would: it is culled only now that it stands
     if (one && body.pose != Pose()) {
-      shell_.to_world_frame(*one, body.pose);
-      solid_.reframe_one(number, {ports_.atoms.mass[*one], shell_[*one].place, ports_.atoms.radius[*one], shell_[*one].held});
+      bed_.shell.to_world_frame(*one, body.pose);
+      bed_.solid.reframe_one(number,
+                             {bed_.atoms.mass[*one], bed_.shell[*one].place, bed_.atoms.radius[*one], bed_.shell[*one].held});
     }
-    solid_.ground(number, true);
+    bed_.solid.ground(number, true);
   }
 }
 
 void Grounding::share_out_loads() {
-  std::vector<double> weights(groups_.spanning_bodies(), 0.0);
+  std::vector<double> weights(bed_.groups.spanning_bodies(), 0.0);
   std::vector<std::pair<const ActiveBody*, double>> sums;
   for (const ActiveBody& a : motion_.active()) {
     const Sum* mean = a.stands ? mean_extra_load_.find(a.number) : nullptr;
     if (!mean) continue;
-    sums.emplace_back(&a, solid_.weigh_wall_loads(a.number, mean->value));
+    sums.emplace_back(&a, bed_.solid.weigh_wall_loads(a.number, mean->value));
     if (a.spanning >= 0) weights[static_cast<std::size_t>(a.spanning)] += sums.back().second;
   }
-  if (!weights.empty()) ports_.ranks.sum(weights.data(), static_cast<int>(weights.size()));
+  if (!weights.empty()) bed_.ranks.sum(weights.data(), static_cast<int>(weights.size()));
   for (const auto& [a, sum] : sums)
-    solid_.share_out_wall_loads(a->number, a->spanning >= 0 ? weights[static_cast<std::size_t>(a->spanning)] : sum);
+    bed_.solid.share_out_wall_loads(a->number, a->spanning >= 0 ? weights[static_cast<std::size_t>(a->spanning)] : sum);
 }
 
 // ------------------------------------------------------------------------------------------------------------ a step
 
 void Grounding::press_on_walls() {
-  for (const auto& [place, force, torque] : solid_.wall_loads().on_meshes())
-    ports_.walls.press(place.first, place.second, -force, -torque);
+  for (const auto& [place, force, torque] : bed_.solid.wall_loads().on_meshes())
+    bed_.walls.press(place.first, place.second, -force, -torque);
   // a body that stands still in spite of a load hands it on to the walls that hold it
   for (const ActiveBody& a : motion_.active()) {
     if (!a.stands) continue;
     Vec3& mean = mean_extra_load_[a.number].value;
-    mean += (a.change - mean) / scales_.look_every();
+    mean += (a.change - mean) / bed_.scales.look_every();
     if (a.change.isZero(0)) continue;
-    for (const auto& [place, e] : solid_.wall_loads().of(a.number)) {
+    for (const auto& [place, e] : bed_.solid.wall_loads().of(a.number)) {
       if (!(e.share > 0)) continue;
       const Vec3 extra = e.share * a.change, at = e.force.cross(e.torque) / e.force.squaredNorm();
-      ports_.walls.press(place.first, place.second, extra, at.cross(extra));  // where the element bears its own load
+      bed_.walls.press(place.first, place.second, extra, at.cross(extra));  // where the element bears its own load
     }
   }
 }

@@ -5,20 +5,16 @@
 #include <set>
 #include <vector>
 
-#include "body_groups.h"
+#include "bed.h"
 #include "body_motion.h"
 #include "flat_map.h"
-#include "ports.h"
-#include "solid.h"
 #include "wall_survey.h"
 
 namespace solidcull {
 
 class Grounding : public BodyFollower {
  public:
-  Grounding(const Ports& ports, const Scales& scales, Solid& solid, Shell& shell, const BodyGroups& groups,
-            const BodyMotion& motion, const WallSurvey& walls)
-      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), groups_(groups), motion_(motion), walls_(walls) {}
+  Grounding(Bed& bed, const BodyMotion& motion, const WallSurvey& walls) : bed_(bed), motion_(motion), walls_(walls) {}
 
   /// At each look: bodies at rest at walls that stand still are grounded; those that the walls might not hold any more wait to be
   /// let go. Collective.
@@ -46,11 +42,7 @@ class Grounding : public BodyFollower {
   bool may_be_let_go(int number, const SolidBody& body, bool held) const;
   bool is_at_rest(const SolidBody& body, const ActiveBody& loads, const int* only_atom) const;
 
-  const Ports& ports_;
-  const Scales& scales_;
-  Solid& solid_;
-  Shell& shell_;
-  const BodyGroups& groups_;
+  Bed& bed_;
   const BodyMotion& motion_;
   const WallSurvey& walls_;
   FlatMap<int> looks_at_rest_;    // body -> looks in a row at which it was at rest at a wall that stands still

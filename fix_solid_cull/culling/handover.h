@@ -5,23 +5,14 @@
 #include <map>
 #include <vector>
 
+#include "bed.h"
 #include "parcels.h"
 
 namespace solidcull {
 
 class Handover : public BodyFollower {
  public:
-  Handover(const Ports& ports, Solid& solid, Shell& shell, const AtomIndex& index, const GranuleMasses& masses, Parcels& parcels,
-           const BodyGroups& groups, const StoredSearch& stored, Arrivals& arrivals)
-      : ports_(ports),
-        solid_(solid),
-        shell_(shell),
-        index_(index),
-        masses_(masses),
-        parcels_(parcels),
-        groups_(groups),
-        stored_(stored),
-        arrivals_(arrivals) {}
+  Handover(Bed& bed, Parcels& parcels) : bed_(bed), parcels_(parcels) {}
 
   /// At the end of a membership change. True if something went. Collective.
   bool send_home();
@@ -41,15 +32,8 @@ class Handover : public BodyFollower {
  private:
   void leave(const std::vector<std::int64_t>& atoms, const std::vector<std::int64_t>& stored);
 
-  const Ports& ports_;
-  Solid& solid_;
-  Shell& shell_;
-  const AtomIndex& index_;
-  const GranuleMasses& masses_;
+  Bed& bed_;
   Parcels& parcels_;
-  const BodyGroups& groups_;
-  const StoredSearch& stored_;
-  Arrivals& arrivals_;
   std::map<int, Pose> at_home_;  // frames of the store when their granules were last compared with the subdomain
 };
 

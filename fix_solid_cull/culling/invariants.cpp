@@ -25,31 +25,31 @@ bool Invariants::asked() {
 
 /// I1. Ghosts are here, so every exterior granule near this rank's interior ones is seen.
 void Invariants::check_shell_is_closed() const {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   for (int i = 0; i < atoms.owned + atoms.ghosts; ++i) {
     if (atoms.is_interface(i)) continue;
-    stored_.for_each_near(atoms.sphere(i), 0.0, [&](const Resident& g) {
+    bed_.stored.for_each_near(atoms.sphere(i), 0.0, [&](const Resident& g) {
       broken("exterior granule " + std::to_string(atoms.tag[i]) + " touches interior granule " + std::to_string(g.tag));
     });
   }
-  if (!census_.several_bodies()) return;
+  if (!bed_.census.several_bodies()) return;
   for (int i = 0; i < atoms.owned; ++i) {
-    if (!shell_[i].locked) continue;
-    const int own = groups_.key_of(shell_[i].body);
-    stored_.for_each_near(
+    if (!bed_.shell[i].locked) continue;
+    const int own = bed_.groups.key_of(bed_.shell[i].body);
+    bed_.stored.for_each_near(
         atoms.sphere(i), 0.0,
         [&](const Resident& g) {
           broken("granule " + std::to_string(atoms.tag[i]) + " of another body touches interior granule " +
                  std::to_string(g.tag));
         },
-        [&](int body) { return groups_.key_of(body) == own; });
+        [&](int body) { return bed_.groups.key_of(body) == own; });
   }
 }
 
 /// I2.
 void Invariants::check_ledger() const {
-  const GranuleStore& store = solid_.store();
-  const Ledger& ledger = solid_.ledger();
+  const GranuleStore& store = bed_.solid.store();
+  const Ledger& ledger = bed_.solid.ledger();
   if (ledger.count_due() != static_cast<std::int64_t>(store.size()))
     broken("the ledger has " + std::to_string(ledger.count_due()) + " granules in the store, which holds " +
            std::to_string(store.size()));
@@ -61,16 +61,16 @@ void Invariants::check_ledger() const {
 /// Every locked granule is a member of a body, and nothing else is; each body has the count, mass and first moment of its
 /// granules.
 void Invariants::check_bodies() const {
-  const Atoms& atoms = ports_.atoms;
-  const GranuleStore& store = solid_.store();
-  const SolidBodies& bodies = solid_.bodies();
+  const Atoms& atoms = bed_.atoms;
+  const GranuleStore& store = bed_.solid.store();
+  const SolidBodies& bodies = bed_.solid.bodies();
   std::size_t locked = store.size();
-  for (int i = 0; i < atoms.owned; ++i) locked += shell_[i].locked;
-  if (locked != solid_.locked())
-    broken(std::to_string(solid_.locked()) + " granules are in bodies and " + std::to_string(locked) + " are locked");
+  for (int i = 0; i < atoms.owned; ++i) locked += bed_.shell[i].locked;
+  if (locked != bed_.solid.locked())
+    broken(std::to_string(bed_.solid.locked()) + " granules are in bodies and " + std::to_string(locked) + " are locked");
   std::map<int, MassProperties> sums;
   for (int i = 0; i < atoms.owned; ++i) {
-    const Locked& e = shell_[i];
+    const Locked& e = bed_.shell[i];
     if (!e.locked) continue;
     if (e.body != bodies.body_of(atoms.tag[i]))
       broken("interface granule " + std::to_string(atoms.tag[i]) + " stands in the wrong body");
@@ -87,13 +87,13 @@ void Invariants::check_bodies() const {
     const MassProperties& m = bodies.body(number).mass;
     // both are sums of so many numbers, in another order
     const double rounding = std::max(1e-12, std::numeric_limits<double>::epsilon() * static_cast<double>(sum.count));
-    const double places = 1e-9 * ports_.run.edges()[0] + (scales_.compact() ? 1e-7 * scales_.diameter() : 0.0);
+    const double places = 1e-9 * bed_.run.edges()[0] + (bed_.scales.compact() ? 1e-7 * bed_.scales.diameter() : 0.0);
     if (m.count != sum.count || m.held != sum.held || std::abs(m.mass - sum.mass) > rounding * sum.mass ||
         (m.centre() - sum.centre()).norm() > places)
       broken("body " + std::to_string(number) + " has other mass properties than its granules: count " +
              std::to_string(m.count - sum.count) + ", held " + std::to_string(m.held - sum.held) + ", mass by " +
              std::to_string((m.mass - sum.mass) / sum.mass * 1e12) + "e-12 of it, centre by " +
-             std::to_string((m.centre() - sum.centre()).norm() / scales_.diameter() * 1e9) + "e-9 d");
+             std::to_string((m.centre() - sum.centre()).norm() / bed_.scales.diameter() * 1e9) + "e-9 d");
   }
 }
 

@@ -5,13 +5,11 @@
 #include <set>
 #include <utility>
 
-#include "body_changes.h"
-
 namespace solidcull {
 
 MembershipChange::MembershipChange(const Parts& parts, Wakes wakes, Proposal proposal)
-    : p_(parts), wakes_(std::move(wakes)), proposal_(std::move(proposal)) {
-  p_.solid.count_carves(wakes_.carves);
+    : bed_(parts.bed), p_(parts), wakes_(std::move(wakes)), proposal_(std::move(proposal)) {
+  bed_.solid.count_carves(wakes_.carves);
   changes_.joins = proposal_.joins;
 }
 
@@ -24,19 +22,19 @@ void MembershipChange::free_and_lock() {
 }
 
 void MembershipChange::lock(int i) {
-  Atoms& atoms = p_.ports.atoms;
-  p_.shell.lock(atoms, i, p_.ports.run.step, p_.survey[i].normal_load, p_.scales.sleeping() && p_.walls[i].stands);
+  Atoms& atoms = bed_.atoms;
+  bed_.shell.lock(atoms, i, bed_.run.step, p_.survey[i].normal_load, bed_.scales.sleeping() && p_.survey.stands_at_wall(i));
   const Survey::Rested rested = p_.survey.rests(i);
-  if (rested != Survey::Rested::first_time) p_.solid.count_locked_again(rested == Survey::Rested::moved);
-  if (!p_.scales.rigid()) {
+  if (rested != Survey::Rested::first_time) bed_.solid.count_locked_again(rested == Survey::Rested::moved);
+  if (!bed_.scales.rigid()) {
     atoms.set_velocity(i, Vec3::Zero());
-    if (p_.ports.contacts.turn_granules) atoms.set_spin(i, Vec3::Zero());
+    if (bed_.contacts.turn_granules) atoms.set_spin(i, Vec3::Zero());
   }
-  p_.solid.count_locked();
+  bed_.solid.count_locked();
 }
 
 void MembershipChange::unlock(int i) {
-  p_.shell.unlock(p_.ports.atoms, i);
+  bed_.shell.unlock(bed_.atoms, i);
   p_.survey.wakes(i);
   p_.closure.unlocked(i);
 }
@@ -44,19 +42,19 @@ void MembershipChange::unlock(int i) {
 void MembershipChange::free_what_wakes() {
   if (wakes_.none()) return;
   std::set<int> whole;  // bodies of this rank that wake as a whole
-  for (const auto& b : p_.solid.bodies().bodies())
-    if (wakes_.all || wakes_.wakes_body(p_.groups.key_of(b.first))) whole.insert(b.first);
-  const Atoms& atoms = p_.ports.atoms;
+  for (const auto& b : bed_.solid.bodies().bodies())
+    if (wakes_.all || wakes_.wakes_body(bed_.groups.key_of(b.first))) whole.insert(b.first);
+  const Atoms& atoms = bed_.atoms;
   for (int i = 0; i < atoms.owned; ++i)
-    if (p_.shell[i].locked && (whole.count(p_.shell[i].body) || wakes_.in_ball(atoms.place(i), 0))) {
+    if (bed_.shell[i].locked && (whole.count(bed_.shell[i].body) || wakes_.in_ball(atoms.place(i), 0))) {
       unlock(i);
       changes_.freed.push_back(atoms.tag[i]);
     }
   std::vector<std::int64_t> stored;
-  for (const int body : whole) p_.solid.store().for_each_of_body(body, [&](const Resident& g) { stored.push_back(g.tag); });
+  for (const int body : whole) bed_.solid.store().for_each_of_body(body, [&](const Resident& g) { stored.push_back(g.tag); });
   for (const Ball& b : wakes_.balls)
-    p_.stored.for_each_in_box(b.centre - Vec3::Constant(b.radius), b.centre + Vec3::Constant(b.radius), [&](const Resident& g) {
-      if (!whole.count(g.body) && b.holds(p_.solid.nearest_image(p_.solid.in_world(g), b.centre), 0)) stored.push_back(g.tag);
+    bed_.stored.for_each_in_box(b.centre - Vec3::Constant(b.radius), b.centre + Vec3::Constant(b.radius), [&](const Resident& g) {
+      if (!whole.count(g.body) && b.holds(bed_.solid.nearest_image(bed_.solid.in_world(g), b.centre), 0)) stored.push_back(g.tag);
     });
   std::sort(stored.begin(), stored.end());
   stored.erase(std::unique(stored.begin(), stored.end()), stored.end());
@@ -69,19 +67,19 @@ void MembershipChange::free_what_wakes() {
 
 /// Since the look it may have been struck or moved.
 bool MembershipChange::still_rests(int i) const {
-  const SolidStateLaw& law = p_.scales.solid_state();
-  const Atoms& atoms = p_.ports.atoms;
-  if (!p_.scales.rigid()) return law.at_rest(atoms.velocity(i), atoms.spin(i), atoms.radius[i]);
+  const SolidStateLaw& law = bed_.scales.solid_state();
+  const Atoms& atoms = bed_.atoms;
+  if (!bed_.scales.rigid()) return law.at_rest(atoms.velocity(i), atoms.spin(i), atoms.radius[i]);
   const AtRest& r = p_.survey[i];
-  const double passed = static_cast<double>(p_.ports.run.step - r.since) * p_.ports.run.dt;
+  const double passed = static_cast<double>(bed_.run.step - r.since) * bed_.run.dt;
   return law.went_on(atoms.velocity(i) - r.velocity, r.acceleration_around, r.acceleration_around, passed);
 }
 
 void MembershipChange::lock_what_was_chosen() {
   for (const std::int64_t tag : proposal_.chosen) {
-    const int* i = p_.index.find(tag);
+    const int* i = bed_.index.find(tag);
     // it may have left this rank or the simulation, too, or something wakes beside it
-    if (!i || p_.shell[*i].locked || wakes_.in_ball(p_.ports.atoms.place(*i), p_.scales.diameter()) || !still_rests(*i)) continue;
+    if (!i || bed_.shell[*i].locked || wakes_.in_ball(bed_.atoms.place(*i), bed_.scales.diameter()) || !still_rests(*i)) continue;
     lock(*i);
     changes_.locked.push_back(tag);
     changes_.locked_anywhere[tag] = 1;
@@ -89,7 +87,7 @@ void MembershipChange::lock_what_was_chosen() {
 }
 
 void MembershipChange::tell_neighbours() {
-  if (!p_.ports.ranks.has_neighbours()) return;
+  if (!bed_.ranks.has_neighbours()) return;
   struct Row {
     Triple at;
     std::int64_t tag;
@@ -97,14 +95,14 @@ void MembershipChange::tell_neighbours() {
   };
   std::vector<Row> rows;
   const auto tell = [&](const std::vector<std::int64_t>& tags, bool locked) {
-    for (const std::int64_t tag : tags) rows.push_back({triple(p_.ports.atoms.place(p_.index.at(tag))), tag, locked});
+    for (const std::int64_t tag : tags) rows.push_back({triple(bed_.atoms.place(bed_.index.at(tag))), tag, locked});
   };
   tell(changes_.freed, false);
   tell(changes_.locked, true);
-  const double reach = contact_reach(p_.ports, p_.solid);
-  for (const Row& r : p_.ports.ranks.exchange(rows, reach))
+  const double reach = contact_reach(bed_);
+  for (const Row& r : bed_.ranks.exchange(rows, reach))
     (r.locked ? changes_.locked_anywhere : changes_.freed_anywhere)[r.tag] = 1;
-  const std::vector<Join> joins = p_.ports.ranks.exchange(changes_.joins, reach);
+  const std::vector<Join> joins = bed_.ranks.exchange(changes_.joins, reach);
   changes_.joins.insert(changes_.joins.end(), joins.begin(), joins.end());
 }
 
@@ -113,32 +111,32 @@ void MembershipChange::tell_neighbours() {
 void MembershipChange::thaw_and_unlock() {
   p_.freezing.thaw(changes_);
   for (const std::int64_t tag : changes_.freed) leave_body(tag);
-  changes_.freed_anywhere.for_each([&](std::int64_t tag, char) { p_.solid.thaw(tag); });
-  split_bodies(p_.ports.atoms, p_.solid, p_.shell, p_.index, p_.masses);
+  changes_.freed_anywhere.for_each([&](std::int64_t tag, char) { bed_.solid.thaw(tag); });
+  bed_.split_bodies();
   for (const std::int64_t tag : changes_.freed) {
-    const int i = p_.index.at(tag), body = p_.shell[i].body;
-    if (p_.scales.sleeping() && body && !p_.solid.exists(body)) p_.solid.forget(body);
-    p_.shell.left_body(i);
+    const int i = bed_.index.at(tag), body = bed_.shell[i].body;
+    if (bed_.scales.sleeping() && body && !bed_.solid.exists(body)) bed_.solid.forget(body);
+    bed_.shell.left_body(i);
   }
 }
 
 void MembershipChange::leave_body(std::int64_t tag) {
-  const int body = p_.solid.bodies().body_of(tag), i = p_.index.at(tag);
-  Atoms& atoms = p_.ports.atoms;
-  const Vec3 x = p_.solid.bodies().pose(body).to_world(p_.shell[i].place);
+  const int body = bed_.solid.bodies().body_of(tag), i = bed_.index.at(tag);
+  Atoms& atoms = bed_.atoms;
+  const Vec3 x = bed_.solid.bodies().pose(body).to_world(bed_.shell[i].place);
   // nothing has moved since it was locked: it goes on as if it had never been; else it starts from its body's motion
-  const bool back = p_.shell[i].lock_step == p_.ports.run.step;
-  const Twist twist = p_.solid.bodies().body(body).twist;
-  atoms.set_velocity(i, back ? p_.shell[i].velocity : twist.at(x));
-  if (p_.ports.contacts.turn_granules) atoms.set_spin(i, back ? p_.shell[i].spin : twist.spin);
-  const double radius = p_.solid.bodies().turning_radius(atoms.radius[i]);
+  const bool back = bed_.shell[i].lock_step == bed_.run.step;
+  const Twist twist = bed_.solid.bodies().body(body).twist;
+  atoms.set_velocity(i, back ? bed_.shell[i].velocity : twist.at(x));
+  if (bed_.contacts.turn_granules) atoms.set_spin(i, back ? bed_.shell[i].spin : twist.spin);
+  const double radius = bed_.solid.bodies().turning_radius(atoms.radius[i]);
   const MovingGranule given{atoms.mass[i], atoms.radius[i], x, atoms.velocity(i), atoms.spin(i)};
-  const double before = p_.solid.kinetic_energy(body);
-  p_.solid.unlock(tag, p_.masses(tag), back && p_.scales.rigid() ? &given : nullptr);
+  const double before = bed_.solid.kinetic_energy(body);
+  bed_.solid.unlock(tag, bed_.masses(tag), back && bed_.scales.rigid() ? &given : nullptr);
   const double after =
-      p_.solid.kinetic_energy(body) + RigidPart::granule(given.mass, radius, x, given.velocity, given.spin).kinetic_energy();
-  p_.solid.count_restored(after - before);
-  p_.solid.thaw(tag);
+      bed_.solid.kinetic_energy(body) + RigidPart::granule(given.mass, radius, x, given.velocity, given.spin).kinetic_energy();
+  bed_.solid.count_restored(after - before);
+  bed_.solid.thaw(tag);
 }
 
 // ------------------------------------------------------------------------------------------------------------ into bodies
@@ -146,22 +144,22 @@ void MembershipChange::leave_body(std::int64_t tag) {
 void MembershipChange::freeze_and_lock() {
   p_.freezing.freeze(changes_, proposal_);
   lock_into_bodies();
-  adopt_places(p_.ports.atoms, p_.solid, p_.shell, p_.arrivals);
+  bed_.adopt_places();
 }
 
 void MembershipChange::lock_into_body(std::int64_t tag) {
-  const int i = p_.index.at(tag);
-  const Atoms& atoms = p_.ports.atoms;
-  const Locked& e = p_.shell[i];
+  const int i = bed_.index.at(tag);
+  const Atoms& atoms = bed_.atoms;
+  const Locked& e = bed_.shell[i];
   // it has the motion that it had before it was locked; without bodies that move, its momentum goes to the ground
-  const bool rigid = p_.scales.rigid();
+  const bool rigid = bed_.scales.rigid();
   const MovingGranule granule{atoms.mass[i],
                               atoms.radius[i],
                               atoms.place(i),
                               rigid ? e.velocity : Vec3(Vec3::Zero()),
                               rigid ? e.spin : Vec3(Vec3::Zero()),
                               e.held};
-  p_.shell.stands(i, p_.solid.lock(tag, granule, p_.masses.by_tag()));
+  bed_.shell.stands(i, bed_.solid.lock(tag, granule, bed_.masses.by_tag()));
 }
 
 /// From neighbour to neighbour, so that what hangs together becomes one body without many that merge.
@@ -176,17 +174,17 @@ void MembershipChange::lock_into_bodies() {
     for (std::size_t at = 0; at < queue.size(); ++at) {
       const std::int64_t tag = queue[at];
       lock_into_body(tag);
-      p_.solid.contacts().for_each_partner(tag, [&](std::int64_t partner) {
+      bed_.solid.contacts().for_each_partner(tag, [&](std::int64_t partner) {
         if (waits.erase(static_cast<std::int32_t>(partner))) queue.push_back(partner);
       });
     }
   }
-  for (const Join& j : changes_.joins) p_.solid.tie(j.a, j.b, p_.masses.by_tag());
+  for (const Join& j : changes_.joins) bed_.solid.tie(j.a, j.b, bed_.masses.by_tag());
 }
 
 void MembershipChange::finish_bodies() {
   p_.freezing.freeze_between_merged();
-  p_.solid.turn_frozen();
+  bed_.solid.turn_frozen();
 }
 
 }  // namespace solidcull

@@ -4,15 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "atom_index.h"
-#include "body_groups.h"
+#include "bed.h"
 #include "contact_freezing.h"
-#include "granule_masses.h"
-#include "ports.h"
 #include "proposal.h"
-#include "shell.h"
 #include "shell_closure.h"
-#include "solid.h"
 #include "store_exchange.h"
 #include "survey.h"
 #include "wake_requests.h"
@@ -24,17 +19,8 @@ namespace solidcull {
 class MembershipChange {
  public:
   struct Parts {
-    const Ports& ports;
-    const Scales& scales;
-    Solid& solid;
-    Shell& shell;
-    AtomIndex& index;
-    const GranuleMasses& masses;
-    Arrivals& arrivals;
-    const BodyGroups& groups;
-    const WallSurvey& walls;
+    Bed& bed;
     Survey& survey;
-    StoredSearch& stored;
     StoreExchange& exchange;
     ShellClosure& closure;
     ContactFreezing& freezing;
@@ -70,6 +56,7 @@ class MembershipChange {
   void lock_into_body(std::int64_t tag);
   void lock_into_bodies();
 
+  Bed& bed_;
   const Parts p_;
   const Wakes wakes_;
   const Proposal proposal_;

@@ -13,28 +13,28 @@ namespace solidcull {
 std::string OutputFiles::file_of_step(const std::string& pattern) const {
   const std::size_t star = pattern.find('*');
   if (star == std::string::npos) return pattern;
-  return pattern.substr(0, star) + std::to_string(ports_.run.deck_step()) + pattern.substr(star + 1);
+  return pattern.substr(0, star) + std::to_string(bed_.run.deck_step()) + pattern.substr(star + 1);
 }
 
 void OutputFiles::begin_run() {
-  for (const auto* outputs : {&scales_.settings().meshes, &scales_.settings().beds}) {
-    const char* const keyword = outputs == &scales_.settings().beds ? "bed" : "mesh";
+  for (const auto* outputs : {&bed_.scales.settings().meshes, &bed_.scales.settings().beds}) {
+    const char* const keyword = outputs == &bed_.scales.settings().beds ? "bed" : "mesh";
     for (const Output& o : *outputs) {
       on_root(keyword, [&] { check_folder_of(o.file); });
       if (o.file.find('*') == std::string::npos && said_.insert(o.file).second)
-        ports_.run.say("keyword '" + std::string(keyword) + "': " + o.file +
-                       " has no '*' for the step in its name, and holds the last state only");
+        bed_.run.say("keyword '" + std::string(keyword) + "': " + o.file +
+                     " has no '*' for the step in its name, and holds the last state only");
     }
   }
 }
 
 void OutputFiles::write_due() {
-  const std::int64_t step = ports_.run.deck_step();
+  const std::int64_t step = bed_.run.deck_step();
   if (step == written_at_) return;
   const auto due = [&](int every) { return every > 0 && step % every == 0; };
-  for (const Output& o : scales_.settings().meshes)
+  for (const Output& o : bed_.scales.settings().meshes)
     if (due(o.every)) write_meshes(file_of_step(o.file));
-  for (const Output& o : scales_.settings().beds)
+  for (const Output& o : bed_.scales.settings().beds)
     if (due(o.every)) write_bed(file_of_step(o.file));
   written_at_ = step;
 }
@@ -43,12 +43,12 @@ void OutputFiles::write_due() {
 template <class Write>
 void OutputFiles::on_root(const char* keyword, Write write) {
   std::string failure;
-  if (ports_.ranks.me == 0) try {
+  if (bed_.ranks.me == 0) try {
       write();
     } catch (const std::exception& e) {
       failure = e.what();
     }
-  if (ports_.ranks.any(!failure.empty()))
+  if (bed_.ranks.any(!failure.empty()))
     throw InputError("keyword '" + std::string(keyword) + "': " + failure + "; write it elsewhere, or leave the keyword out");
 }
 
@@ -71,22 +71,22 @@ std::map<int, const InterfaceMesh*> OutputFiles::whole_meshes(const std::map<int
   std::vector<Head> heads;
   std::vector<char> bytes;
   for (const auto& [body, mesh] : here) {
-    if (ports_.ranks.me == 0) break;
+    if (bed_.ranks.me == 0) break;
     const std::string part = mesh.to_bytes();
-    heads.push_back({groups_.key_of(body), part.size()});
+    heads.push_back({bed_.groups.key_of(body), part.size()});
     bytes.insert(bytes.end(), part.begin(), part.end());
   }
-  if (ports_.ranks.count > 1) {
-    heads = ports_.ranks.gather_on_root(heads);
-    bytes = ports_.ranks.gather_on_root(bytes);
+  if (bed_.ranks.count > 1) {
+    heads = bed_.ranks.gather_on_root(heads);
+    bytes = bed_.ranks.gather_on_root(bytes);
   }
   std::map<int, const InterfaceMesh*> whole;
-  if (ports_.ranks.me != 0) return whole;
+  if (bed_.ranks.me != 0) return whole;
   std::map<int, int> parts_of;
   for (const Head& h : heads) ++parts_of[h.key];
-  for (const auto& body : here) ++parts_of[groups_.key_of(body.first)];
+  for (const auto& body : here) ++parts_of[bed_.groups.key_of(body.first)];
   const auto add = [&](int key, const std::string& part) {
-    InterfaceMesh mesh = InterfaceMesh::from_bytes(part, scales_.voxel(), scales_.closing());
+    InterfaceMesh mesh = InterfaceMesh::from_bytes(part, bed_.scales.voxel(), bed_.scales.closing());
     const auto there = parts.find(key);
     if (there == parts.end())
       parts.emplace(key, std::move(mesh));
@@ -94,7 +94,7 @@ std::map<int, const InterfaceMesh*> OutputFiles::whole_meshes(const std::map<int
       there->second.merge(std::move(mesh));
   };
   for (const auto& [body, mesh] : here) {
-    const int key = groups_.key_of(body);
+    const int key = bed_.groups.key_of(body);
     if (parts_of[key] == 1)
       whole[key] = &mesh;
     else
@@ -149,21 +149,21 @@ void OutputFiles::write_bed(const std::string& file) {
     int type, state, body;
   };
   std::vector<Row> rows;
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   for (int i = 0; i < atoms.owned; ++i) {
-    const Locked& e = shell_[i];
+    const Locked& e = bed_.shell[i];
     const GranuleState state = !e.locked      ? GranuleState::exterior
                                : e.excess > 1 ? GranuleState::waking
                                               : GranuleState::interface_;
     rows.push_back({triple(atoms.place(i)), triple(atoms.velocity(i)), atoms.radius[i], atoms.tag[i], atoms.type[i],
-                    static_cast<int>(state), static_cast<int>(shell_.labels()[i])});
+                    static_cast<int>(state), static_cast<int>(bed_.shell.labels()[i])});
   }
-  solid_.store().for_each([&](const Resident& g) {
-    const Vec3 x = solid_.in_world(g);
-    rows.push_back({triple(ports_.run.wrapped(x)), triple(solid_.bodies().body(g.body).twist.at(x)), g.radius, g.tag,
-                    solid_.store().get(g.tag).type, static_cast<int>(GranuleState::interior), groups_.key_of(g.body)});
+  bed_.solid.store().for_each([&](const Resident& g) {
+    const Vec3 x = bed_.solid.in_world(g);
+    rows.push_back({triple(bed_.run.wrapped(x)), triple(bed_.solid.bodies().body(g.body).twist.at(x)), g.radius, g.tag,
+                    bed_.solid.store().get(g.tag).type, static_cast<int>(GranuleState::interior), bed_.groups.key_of(g.body)});
   });
-  rows = ports_.ranks.gather_on_root(rows);
+  rows = bed_.ranks.gather_on_root(rows);
   on_root("bed", [&] {
     std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.tag < b.tag; });
     BedTable bed;

@@ -6,22 +6,16 @@
 #include <set>
 #include <string>
 
-#include "body_groups.h"
+#include "bed.h"
 #include "body_meshes.h"
-#include "ports.h"
 #include "report.h"
-#include "scales.h"
-#include "shell.h"
-#include "solid.h"
 
 namespace solidcull {
 
 /// Files are written whole or not at all; one that cannot be written is an InputError on all ranks.
 class OutputFiles {
  public:
-  OutputFiles(const Ports& ports, const Scales& scales, const Solid& solid, Shell& shell, const BodyGroups& groups,
-              BodyMeshes& meshes, Report& report)
-      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), groups_(groups), meshes_(meshes), report_(report) {}
+  OutputFiles(Bed& bed, BodyMeshes& meshes, Report& report) : bed_(bed), meshes_(meshes), report_(report) {}
 
   /// A run begins: files can be written where they are to be. Collective.
   void begin_run();
@@ -38,11 +32,7 @@ class OutputFiles {
   template <class Write>
   void on_root(const char* keyword, Write write);
 
-  const Ports& ports_;
-  const Scales& scales_;
-  const Solid& solid_;
-  Shell& shell_;
-  const BodyGroups& groups_;
+  Bed& bed_;
   BodyMeshes& meshes_;
   Report& report_;
   std::int64_t written_at_ = -1;  // a step of the deck

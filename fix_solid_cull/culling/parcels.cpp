@@ -4,7 +4,6 @@
 #include <string>
 #include <type_traits>
 
-#include "body_changes.h"
 #include "flat_map.h"
 #include "store_exchange.h"
 
@@ -79,14 +78,14 @@ Pose read_pose(Reader& in) {
 
 std::vector<double> Parcels::pack(const std::vector<std::int64_t>& stored,
                                   const std::vector<std::int64_t>& interface_tags) const {
-  const FrozenContacts& contacts = solid_.contacts();
-  const SolidBodies& living = solid_.bodies();
+  const FrozenContacts& contacts = bed_.solid.contacts();
+  const SolidBodies& living = bed_.solid.bodies();
   Writer w;
-  w.number(ports_.ranks.me);
+  w.number(bed_.ranks.me);
   write(w, cover_.observer());
   write(w, cover_.observed_then());
-  w.number(ports_.atoms.layouts());
-  for (int l = 0; l < ports_.atoms.layouts(); ++l) w.text(ports_.atoms.layout_text(l));
+  w.number(bed_.atoms.layouts());
+  for (int l = 0; l < bed_.atoms.layouts(); ++l) w.text(bed_.atoms.layout_text(l));
 
   std::map<int, int> index;  // body -> its place in this list
   Writer bodies;
@@ -102,8 +101,8 @@ std::vector<double> Parcels::pack(const std::vector<std::int64_t>& stored,
   Writer granules;
   std::vector<double> record;
   for (const std::int64_t tag : stored) {
-    const StoredGranule g = solid_.store().get(tag);
-    solid_.store().record(tag, record);
+    const StoredGranule g = bed_.solid.store().get(tag);
+    bed_.solid.store().record(tag, record);
     granules.numbers({double(g.tag), g.mass, g.radius, double(g.held), double(index_of(g.body))});
     granules.vector(g.position);
     granules.number(static_cast<double>(record.size()));
@@ -113,9 +112,9 @@ std::vector<double> Parcels::pack(const std::vector<std::int64_t>& stored,
     named[tag] = 1;
   }
   for (const std::int64_t tag : interface_tags) {
-    const int i = index_.at(tag);
-    const Locked& e = shell_[i];
-    granules.numbers({double(tag), ports_.atoms.mass[i], ports_.atoms.radius[i], double(e.held), double(index_of(e.body))});
+    const int i = bed_.index.at(tag);
+    const Locked& e = bed_.shell[i];
+    granules.numbers({double(tag), bed_.atoms.mass[i], bed_.atoms.radius[i], double(e.held), double(index_of(e.body))});
     granules.vector(e.place);
     granules.number(Parcel::no_record);
     named[tag] = 1;
@@ -139,7 +138,7 @@ std::vector<double> Parcels::pack(const std::vector<std::int64_t>& stored,
     contacts.for_each_elsewhere(tag, [&](std::int64_t partner) {
       if (partner < tag && named.contains(partner)) return;
       const std::int64_t low = std::min(tag, partner);
-      const bool known = solid_.inner_history(*solid_.store().find(low), std::max(tag, partner), inner.data());
+      const bool known = bed_.solid.inner_history(*bed_.solid.store().find(low), std::max(tag, partner), inner.data());
       edge(low, std::max(tag, partner), known ? inner.data() : nullptr);
     });
   w.part(index.size(), bodies);
@@ -159,7 +158,7 @@ std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::s
     sender->observer = read_pose(in);
     sender->observed_then = read_pose(in);
     std::vector<int> layout;
-    for (std::size_t k = in.count(); k > 0; --k) layout.push_back(ports_.atoms.layout_from_text(in.text()));
+    for (std::size_t k = in.count(); k > 0; --k) layout.push_back(bed_.atoms.layout_from_text(in.text()));
     sender->bodies.resize(in.count());
     for (SolidBody& body : sender->bodies)
       body.each_number([&](auto& x) { x = static_cast<std::decay_t<decltype(x)>>(in.number()); });
@@ -186,7 +185,7 @@ std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::s
         s.walls = static_cast<int>(in.whole());
         s.held = g.held;
         s.load_change = in.vector();
-        if (scales_.image_by_place()) s.lock_step = std::min(s.lock_step, StoreExchange::locked_long_ago);
+        if (bed_.scales.image_by_place()) s.lock_step = std::min(s.lock_step, StoreExchange::locked_long_ago);
         g.record = in.numbers(static_cast<std::size_t>(g.length));
       }
       p.granules.push_back(g);
@@ -207,10 +206,10 @@ std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::s
 // ------------------------------------------------------------------------------------------------------------ as it was
 
 void Parcels::begin_as_it_was(const Sender& sender) {
-  solid_.stands_otherwise();
+  bed_.solid.stands_otherwise();
   cover_.set_observer(sender.observer, sender.observed_then);
   number_.clear();
-  for (const SolidBody& body : sender.bodies) number_.push_back(solid_.found(body));
+  for (const SolidBody& body : sender.bodies) number_.push_back(bed_.solid.found(body));
 }
 
 void Parcels::take_as_it_was(const Parcel& p) {
@@ -238,62 +237,62 @@ void Parcels::take_as_it_was(const Parcel& p) {
   std::stable_sort(turns.begin(), turns.end(), [](const Turn& a, const Turn& b) { return a.granule < b.granule; });
 
   std::vector<Resident> stored(n);
-  ContactList contacts(solid_.contacts().width());
+  ContactList contacts(bed_.solid.contacts().width());
   std::vector<double> turned;
   auto turn = turns.begin();
   for (std::size_t k = 0; k < n; ++k) {
     const Parcel::Granule& g = p.granules[k];
     const int body = number_.at(static_cast<std::size_t>(g.body));
     if (!g.record) {
-      solid_.take_in(g.tag, body, {g.place, g.radius});
-      shell_.arrives(index_.at(g.tag), {body, g.place});
+      bed_.solid.take_in(g.tag, body, {g.place, g.radius});
+      bed_.shell.arrives(bed_.index.at(g.tag), {body, g.place});
       continue;
     }
     StoredGranule s = g.stored;
     s.body = body;
-    s = solid_.store().rounded(s);
+    s = bed_.solid.store().rounded(s);
     stored[k] = {s.position, s.radius, s.tag, s.body};
     contacts.clear();
     for (; turn != turns.end() && turn->granule == static_cast<int>(k); ++turn) {
       const Parcel::Edge& e = *turn->edge;
       const double* history = e.history;
       if (history && e.low != g.tag) {
-        turned.assign(history, history + solid_.contacts().width());
-        solid_.contacts().change_side(turned.data());
+        turned.assign(history, history + bed_.solid.contacts().width());
+        bed_.solid.contacts().change_side(turned.data());
         history = turned.data();
       }
       const Resident* const partner = turn->partner < 0 ? nullptr : &stored[static_cast<std::size_t>(turn->partner)];
       contacts.add(e.low == g.tag ? e.high : e.low, history, partner);
     }
-    solid_.add_stored(s, g.record, g.length, contacts);
+    bed_.solid.add_stored(s, g.record, g.length, contacts);
   }
-  for (const Parcel::Edge* e : of_others) solid_.freeze_in_frame(e->low, e->high, e->history);
+  for (const Parcel::Edge* e : of_others) bed_.solid.freeze_in_frame(e->low, e->high, e->history);
 }
 
 void Parcels::end_as_it_was() {
   number_ = {};
   // with `motion fixed` bodies are never settled: what a rigid one needs is not in such a file
-  const auto& bodies = solid_.bodies().bodies();
+  const auto& bodies = bed_.solid.bodies().bodies();
   const bool unsettled = std::any_of(bodies.begin(), bodies.end(), [](const auto& b) { return !(b.second.motion.mass() > 0); });
-  if (ports_.ranks.any(unsettled))
-    groups_.settle();
+  if (bed_.ranks.any(unsettled))
+    bed_.groups.settle();
   else
-    groups_.group();
+    bed_.groups.group();
 }
 
 // ------------------------------------------------------------------------------------------------------------ taken up anew
 
 void Parcels::take_contacts(const Parcel& p, const std::map<std::int64_t, Taken>& taken) {
-  const auto ours = [&](std::int64_t tag) { return taken.count(tag) || solid_.bodies().body_of(tag); };
+  const auto ours = [&](std::int64_t tag) { return taken.count(tag) || bed_.solid.bodies().body_of(tag); };
   for (const Parcel::Edge& e : p.edges) {
-    if ((!ours(e.low) && !ours(e.high)) || solid_.contacts().contains(e.low, e.high)) continue;
+    if ((!ours(e.low) && !ours(e.high)) || bed_.solid.contacts().contains(e.low, e.high)) continue;
     if (!e.history) {
-      solid_.freeze_in_frame(e.low, e.high, nullptr);
+      bed_.solid.freeze_in_frame(e.low, e.high, nullptr);
       continue;
     }
-    std::vector<double> history(e.history, e.history + solid_.contacts().width());
-    solid_.contacts().turn(history.data(), p.sender->bodies.at(e.body).pose.turn());
-    solid_.freeze(e.low, e.high, history.data());
+    std::vector<double> history(e.history, e.history + bed_.solid.contacts().width());
+    bed_.solid.contacts().turn(history.data(), p.sender->bodies.at(e.body).pose.turn());
+    bed_.solid.freeze(e.low, e.high, history.data());
   }
 }
 
@@ -302,20 +301,20 @@ void Parcels::take_granule(std::int64_t tag, const Taken& t) {
   const SolidBody& from = t.parcel->sender->bodies.at(g.body);
   const Vec3 x = from.pose.to_world(g.place);
   const SolidBodies::Place at =
-      solid_.lock(tag, {g.mass, g.radius, x, from.twist.at(x), from.twist.spin, g.held}, masses_.by_tag());
-  SolidBody& to = solid_.body(at.body);
+      bed_.solid.lock(tag, {g.mass, g.radius, x, from.twist.at(x), from.twist.spin, g.held}, bed_.masses.by_tag());
+  SolidBody& to = bed_.solid.body(at.body);
   to.feel_as(from);
-  const int* i = index_.find(tag);
+  const int* i = bed_.index.find(tag);
   if (g.record) {
     StoredGranule s = g.stored;
     s.position = at.position;
     s.body = at.body;
     s.load_change = to.pose.turned_to_frame(from.pose.turned_to_world(s.load_change));
-    solid_.add_stored(solid_.as_stored(s), g.record, g.length);
-  } else if (i && shell_[*i].body == 0) {
-    shell_.arrives(*i, at);
+    bed_.solid.add_stored(bed_.solid.as_stored(s), g.record, g.length);
+  } else if (i && bed_.shell[*i].body == 0) {
+    bed_.shell.arrives(*i, at);
   } else {
-    arrivals_[tag] = {at, g.mass, g.radius, g.held};
+    bed_.arrivals[tag] = {at, g.mass, g.radius, g.held};
   }
 }
 
@@ -324,10 +323,10 @@ void Parcels::take(const Parcel* parcels, std::size_t n) {
   for (std::size_t k = 0; k < n; ++k) {
     const Parcel& p = parcels[k];
     for (const Parcel::Granule& g : p.granules) {
-      if (g.record) solid_.know_radius(g.stored.type, g.radius);
-      const int* i = index_.find(g.tag);
-      const bool here = i && shell_[*i].locked && shell_[*i].body == 0;  // an interface granule of a restart file
-      if (!solid_.bodies().body_of(g.tag) && (here || ports_.ranks.owns(p.sender->bodies.at(g.body).pose.to_world(g.place))))
+      if (g.record) bed_.solid.know_radius(g.stored.type, g.radius);
+      const int* i = bed_.index.find(g.tag);
+      const bool here = i && bed_.shell[*i].locked && bed_.shell[*i].body == 0;  // an interface granule of a restart file
+      if (!bed_.solid.bodies().body_of(g.tag) && (here || bed_.ranks.owns(p.sender->bodies.at(g.body).pose.to_world(g.place))))
         taken.emplace(g.tag, Taken{&p, &g});
     }
   }
@@ -339,11 +338,11 @@ void Parcels::take(const Parcel* parcels, std::size_t n) {
 }
 
 void Parcels::end_taking() {
-  adopt_places(ports_.atoms, solid_, shell_, arrivals_);
-  solid_.turn_frozen();
-  for (const std::int64_t tag : taken_in_) solid_.enter_store(tag);
+  bed_.adopt_places();
+  bed_.solid.turn_frozen();
+  for (const std::int64_t tag : taken_in_) bed_.solid.enter_store(tag);
   taken_in_ = {};
-  groups_.settle();
+  bed_.groups.settle();
 }
 
 }  // namespace solidcull

@@ -7,13 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include "atom_index.h"
-#include "body_groups.h"
+#include "bed.h"
 #include "cover.h"
-#include "granule_masses.h"
-#include "ports.h"
-#include "shell.h"
-#include "solid.h"
 
 namespace solidcull {
 
@@ -49,17 +44,7 @@ struct Parcel {
 
 class Parcels {
  public:
-  Parcels(const Ports& ports, const Scales& scales, Solid& solid, Shell& shell, AtomIndex& index, const GranuleMasses& masses,
-          Arrivals& arrivals, BodyGroups& groups, Cover& cover)
-      : ports_(ports),
-        scales_(scales),
-        solid_(solid),
-        shell_(shell),
-        index_(index),
-        masses_(masses),
-        arrivals_(arrivals),
-        groups_(groups),
-        cover_(cover) {}
+  Parcels(Bed& bed, Cover& cover) : bed_(bed), cover_(cover) {}
 
   /// Stored granules and interface granules with their bodies, and contacts of theirs. Local.
   std::vector<double> pack(const std::vector<std::int64_t>& stored, const std::vector<std::int64_t>& interface_tags) const;
@@ -74,7 +59,7 @@ class Parcels {
     end_taking();
   }
   /// The same in many pieces; a contact comes with the later one of its granules, or before. Local, but for the end.
-  void begin_taking() { solid_.stands_otherwise(); }
+  void begin_taking() { bed_.solid.stands_otherwise(); }
   void take(const Parcel* parcels, std::size_t n);
   void end_taking();
 
@@ -92,14 +77,7 @@ class Parcels {
   void take_granule(std::int64_t tag, const Taken& t);
   void take_contacts(const Parcel& parcel, const std::map<std::int64_t, Taken>& taken);
 
-  const Ports& ports_;
-  const Scales& scales_;
-  Solid& solid_;
-  Shell& shell_;
-  AtomIndex& index_;
-  const GranuleMasses& masses_;
-  Arrivals& arrivals_;
-  BodyGroups& groups_;
+  Bed& bed_;
   Cover& cover_;
   std::vector<std::int64_t> taken_in_;  // stored granules, until the end
   std::vector<int> number_;             // here, of the sender's bodies

@@ -24,20 +24,20 @@ constexpr double longest_way = 4, next_place = 3;  // diameters
 
 bool Refill::pack() {
   const std::vector<std::int64_t> came = exchange_.take_what_came_back();
-  if (!ports_.ranks.any(!came.empty())) return false;
+  if (!bed_.ranks.any(!came.empty())) return false;
   newcomers_.insert(newcomers_.end(), came.begin(), came.end());
   std::sort(newcomers_.begin(), newcomers_.end());
   newcomers_.erase(std::unique(newcomers_.begin(), newcomers_.end()), newcomers_.end());
-  if (!ports_.ranks.has_neighbours())
+  if (!bed_.ranks.has_neighbours())
     pack(sweeps_alone, true);
   else
     for (int round = 0; round < rounds_beside_others; ++round)
-      pack(sweeps_in_a_round, round + 1 < rounds_beside_others && (round + ports_.ranks.me) % 2 == 0);
+      pack(sweeps_in_a_round, round + 1 < rounds_beside_others && (round + bed_.ranks.me) % 2 == 0);
   return true;
 }
 
 void Refill::pack(int sweeps, bool look_for_room) {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   struct Row {
     Triple at;
     double radius;
@@ -49,15 +49,15 @@ void Refill::pack(int sweeps, bool look_for_room) {
   SphereRelaxation::Spheres spheres;
   Vec3 lo = Vec3::Constant(HUGE_VAL), hi = Vec3::Constant(-HUGE_VAL);
   for (const std::int64_t tag : newcomers_) {
-    const int* i = index_.find(tag);
-    if (!i || shell_[*i].body <= 0) continue;  // it went to the store again, or has left its body
+    const int* i = bed_.index.find(tag);
+    if (!i || bed_.shell[*i].body <= 0) continue;  // it went to the store again, or has left its body
     moves[static_cast<std::size_t>(*i)] = 1;
     movable.push_back(*i);
     spheres.free.push_back(atoms.sphere(*i));
     lo = lo.cwiseMin(atoms.place(*i));
     hi = hi.cwiseMax(atoms.place(*i));
   }
-  const double way = longest_way * scales_.diameter(), reach = contact_reach(ports_, solid_) + way;
+  const double way = longest_way * bed_.scales.diameter(), reach = contact_reach(bed_) + way;
   const auto is_near = [&](const Vec3& x) {
     return (x.array() > lo.array() - reach).all() && (x.array() < hi.array() + reach).all();
   };
@@ -65,32 +65,33 @@ void Refill::pack(int sweeps, bool look_for_room) {
   for (int i = 0; i < atoms.owned; ++i) {
     char& mine = moves[static_cast<std::size_t>(i)];
     if (!mine && is_near(atoms.place(i))) {
-      mine = !shell_[i].locked && shell_[i].body > 0;  // freed in this change, and of its body still
+      mine = !bed_.shell[i].locked && bed_.shell[i].body > 0;  // freed in this change, and of its body still
       (mine ? spheres.stiff : spheres.fixed).push_back(atoms.sphere(i));
       if (mine) movable.push_back(i);
     }
-    rows.push_back({triple(atoms.place(i)), atoms.radius[i], ports_.ranks.me, mine != 0});
+    rows.push_back({triple(atoms.place(i)), atoms.radius[i], bed_.ranks.me, mine != 0});
   }
-  if (ports_.ranks.has_neighbours())
-    for (const Row& r : ports_.ranks.exchange(rows, reach))
-      if ((!r.moves || r.rank != ports_.ranks.me) && is_near(vec(r.at)))  // its own see each other across a side
+  if (bed_.ranks.has_neighbours())
+    for (const Row& r : bed_.ranks.exchange(rows, reach))
+      if ((!r.moves || r.rank != bed_.ranks.me) && is_near(vec(r.at)))  // its own see each other across a side
         spheres.fixed.push_back({vec(r.at), r.radius});
   if (spheres.free.empty()) return;
   std::set<std::int64_t> seen;
   for (const Sphere& s : spheres.free)
-    stored_.for_each_near(s, scales_.diameter(), [&](const Resident& g) {
-      if (seen.insert(g.tag).second) spheres.soft.push_back({solid_.nearest_image(solid_.in_world(g), s.centre), g.radius});
+    bed_.stored.for_each_near(s, bed_.scales.diameter(), [&](const Resident& g) {
+      if (seen.insert(g.tag).second)
+        spheres.soft.push_back({bed_.solid.nearest_image(bed_.solid.in_world(g), s.centre), g.radius});
     });
-  Vec3 periods = ports_.run.edges();
+  Vec3 periods = bed_.run.edges();
   for (int d = 0; d < 3; ++d)
-    if (!ports_.run.periodic[d]) periods[d] = 0;
+    if (!bed_.run.periodic[d]) periods[d] = 0;
   SphereRelaxation relaxation(std::move(spheres), periods);
   const std::vector<Sphere> before = relaxation.spheres();
-  const NearWalls walls(ports_.walls, before, way);
-  const double clear = clear_of_walls * scales_.diameter();
+  const NearWalls walls(bed_.walls, before, way);
+  const double clear = clear_of_walls * bed_.scales.diameter();
   std::vector<Vec3> clear_at(before.size(), Vec3::Constant(HUGE_VAL));
   relaxation.keep_to([&](std::size_t k, const Vec3& place) {
-    if ((place - before[k].centre).squaredNorm() >= way * way || !ports_.run.keeps(place)) return false;
+    if ((place - before[k].centre).squaredNorm() >= way * way || !bed_.run.keeps(place)) return false;
     if ((place - clear_at[k]).squaredNorm() < clear * clear) return true;
     if (walls.near(k, {place, before[k].radius}, clear)) return !walls.near(k, {place, before[k].radius}, 0);
     clear_at[k] = place;
@@ -99,7 +100,7 @@ void Refill::pack(int sweeps, bool look_for_room) {
   double least = relaxation.relax(sweeps, overlap_allowed);
   std::vector<Sphere> best = relaxation.spheres();
   for (int n = 0; look_for_room && n < new_beginnings && least > caught; ++n) {
-    if (relaxation.reseat(caught, next_place * scales_.diameter()) == 0) break;
+    if (relaxation.reseat(caught, next_place * bed_.scales.diameter()) == 0) break;
     const double overlap = relaxation.relax(sweeps_again, overlap_allowed);
     if (overlap >= least) continue;
     least = overlap;
@@ -111,8 +112,9 @@ void Refill::pack(int sweeps, bool look_for_room) {
 void Refill::place(const std::vector<int>& atoms, const std::vector<Sphere>& now) {
   for (std::size_t k = 0; k < atoms.size(); ++k) {
     const int i = atoms[k];
-    const Vec3 by = now[k].centre - ports_.atoms.place(i);
-    if (!by.isZero(0)) exchange_.relocate(i, shell_[i].place + solid_.bodies().pose(shell_[i].body).turned_to_frame(by));
+    const Vec3 by = now[k].centre - bed_.atoms.place(i);
+    if (!by.isZero(0))
+      exchange_.relocate(i, bed_.shell[i].place + bed_.solid.bodies().pose(bed_.shell[i].body).turned_to_frame(by));
   }
 }
 

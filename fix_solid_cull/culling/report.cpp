@@ -7,12 +7,12 @@ namespace solidcull {
 
 double Report::value(int n) {
   if (n < 0 || n >= size) return 0;
-  if (totals_step_ != ports_.run.step || totals_version_ != membership_version_) {
+  if (totals_step_ != bed_.run.step || totals_version_ != membership_version_) {
     totals_.clear();
     carried_.clear();
     all_.clear();
   }
-  totals_step_ = ports_.run.step;
+  totals_step_ = bed_.run.step;
   totals_version_ = membership_version_;
   if (totals_.empty()) count_totals();
   if (n < counts) return totals_[n];
@@ -27,25 +27,25 @@ double Report::value(int n) {
 
 void Report::count_totals() {
   double bodies = 0, interface_granules = 0;
-  for (const auto& b : solid_.bodies().bodies()) bodies += groups_.has_key_of_first_part(b.first);
-  if (solid_.bodies().locked() > 0)
-    for (int i = 0; i < ports_.atoms.owned; ++i) interface_granules += shell_[i].locked;
-  const Ledger& ledger = solid_.ledger();
-  const bool open = solid_.has_store();
-  double sums[11] = {ports_.atoms.owned - interface_granules,
+  for (const auto& b : bed_.solid.bodies().bodies()) bodies += bed_.groups.has_key_of_first_part(b.first);
+  if (bed_.solid.bodies().locked() > 0)
+    for (int i = 0; i < bed_.atoms.owned; ++i) interface_granules += bed_.shell[i].locked;
+  const Ledger& ledger = bed_.solid.ledger();
+  const bool open = bed_.solid.has_store();
+  double sums[11] = {bed_.atoms.owned - interface_granules,
                      interface_granules,
-                     open ? static_cast<double>(solid_.store().size()) : 0.0,
+                     open ? static_cast<double>(bed_.solid.store().size()) : 0.0,
                      bodies,
-                     open ? solid_.store().mass() : 0.0,
+                     open ? bed_.solid.store().mass() : 0.0,
                      static_cast<double>(ledger.granules_locked()),
                      static_cast<double>(ledger.granules_restored()),
-                     open ? ledger.mass_error(solid_.store()) : 0.0,
+                     open ? ledger.mass_error(bed_.solid.store()) : 0.0,
                      ledger.energy_added(),
                      static_cast<double>(ledger.granules_locked_again()),
                      static_cast<double>(ledger.granules_that_moved())};
-  ports_.ranks.sum(sums, 11);
+  bed_.ranks.sum(sums, 11);
   double largest[2] = {motion_.largest_excess(), watch_.total()};
-  ports_.ranks.largest(largest, 2);
+  bed_.ranks.largest(largest, 2);
   totals_ = {sums[0],    sums[1],    sums[2], sums[3], sums[4], sums[5], sums[6], static_cast<double>(ledger.carves()),
              largest[0], largest[1], sums[7], sums[8]};
   rests_again_ = {sums[9], sums[10]};
@@ -56,11 +56,11 @@ void Report::count_totals() {
 void Report::sum_carried() {
   double mass = 0, energy = 0;
   Vec3 momentum = Vec3::Zero(), turning = Vec3::Zero(), moment = Vec3::Zero();
-  if (solid_.has_store())
-    solid_.store().for_each([&](const Resident& g) {
-      const Twist& twist = solid_.bodies().body(g.body).twist;
-      const Vec3 x = solid_.in_world(g);
-      const double m = solid_.store().get(g.tag).mass;
+  if (bed_.solid.has_store())
+    bed_.solid.store().for_each([&](const Resident& g) {
+      const Twist& twist = bed_.solid.bodies().body(g.body).twist;
+      const Vec3 x = bed_.solid.in_world(g);
+      const double m = bed_.solid.store().get(g.tag).mass;
       const RigidPart p = RigidPart::granule(m, g.radius, x, twist.at(x), twist.spin);
       mass += m;
       momentum += m * p.velocity;
@@ -70,7 +70,7 @@ void Report::sum_carried() {
     });
   carried_ = {momentum[0], momentum[1], momentum[2], turning[0], turning[1], turning[2],
               energy,      moment[0],   moment[1],   moment[2],  mass};
-  ports_.ranks.sum(carried_.data(), static_cast<int>(carried_.size()));
+  bed_.ranks.sum(carried_.data(), static_cast<int>(carried_.size()));
   for (int d = 7; d < 10; ++d) carried_[d] = carried_[10] > 0 ? carried_[d] / carried_[10] : 0.0;
 }
 
@@ -86,15 +86,15 @@ void Report::sum_all() {
     sums[4] += of_centre;
     sums[5] += p.kinetic_energy() - of_centre;
   };
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   for (int i = 0; i < atoms.owned; ++i) add(atoms.mass[i], atoms.radius[i], atoms.place(i), atoms.velocity(i), atoms.spin(i));
-  if (solid_.has_store())
-    solid_.store().for_each([&](const Resident& g) {
-      const Twist& twist = solid_.bodies().body(g.body).twist;
-      const Vec3 x = solid_.in_world(g);
-      add(solid_.store().get(g.tag).mass, g.radius, ports_.run.wrapped(x), twist.at(x), twist.spin);
+  if (bed_.solid.has_store())
+    bed_.solid.store().for_each([&](const Resident& g) {
+      const Twist& twist = bed_.solid.bodies().body(g.body).twist;
+      const Vec3 x = bed_.solid.in_world(g);
+      add(bed_.solid.store().get(g.tag).mass, g.radius, bed_.run.wrapped(x), twist.at(x), twist.spin);
     });
-  ports_.ranks.sum(sums, 6);
+  bed_.ranks.sum(sums, 6);
   for (int d = 1; d < 4; ++d) sums[d] = sums[0] > 0 ? sums[d] / sums[0] : 0.0;
   all_.assign(sums, sums + 6);
 }
@@ -104,7 +104,7 @@ void Report::tell_run() {
   constexpr int parts = static_cast<int>(Part::count);
   double seconds[parts];
   for (int p = 0; p < parts; ++p) seconds[p] = watch_.seconds(static_cast<Part>(p));
-  ports_.ranks.largest(seconds, parts);
+  bed_.ranks.largest(seconds, parts);
   totals_.clear();
   value(0);
   char text[512];
@@ -113,7 +113,7 @@ void Report::tell_run() {
                 "carves %.0f; mass error %.3g kg, energy added %.3g J; %.0f culled again, %.0f had moved",
                 totals_[0], totals_[1], totals_[2], totals_[3], totals_[5], totals_[6], totals_[7], totals_[10], totals_[11],
                 rests_again_[0], rests_again_[1]);
-  ports_.run.say(text);
+  bed_.run.say(text);
   double total = 0;
   std::string each;
   for (int p = 0; p < parts; ++p) {
@@ -122,7 +122,7 @@ void Report::tell_run() {
     each += text;
   }
   std::snprintf(text, sizeof text, "%.4g s in the fix since it was made: %s", total, each.c_str());
-  ports_.run.say(text);
+  bed_.run.say(text);
 }
 
 }  // namespace solidcull

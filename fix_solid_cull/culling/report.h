@@ -5,11 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "body_groups.h"
+#include "bed.h"
 #include "body_motion.h"
-#include "ports.h"
-#include "shell.h"
-#include "solid.h"
 #include "stop_watch.h"
 
 namespace solidcull {
@@ -23,8 +20,7 @@ class Report {
   static constexpr int size = counts + carried + of_all + again;
   static constexpr int interior = 2;  ///< index of f_ID itself among them
 
-  Report(const Ports& ports, const Solid& solid, const Shell& shell, const BodyGroups& groups, const BodyMotion& motion)
-      : ports_(ports), solid_(solid), shell_(shell), groups_(groups), motion_(motion) {}
+  Report(const Bed& bed, const BodyMotion& motion) : bed_(bed), motion_(motion) {}
 
   /// f_ID[n + 1]. Collective.
   double value(int n);
@@ -40,10 +36,7 @@ class Report {
   void sum_carried();
   void sum_all();
 
-  const Ports& ports_;
-  const Solid& solid_;
-  const Shell& shell_;
-  const BodyGroups& groups_;
+  const Bed& bed_;
   const BodyMotion& motion_;
   StopWatch watch_;
   std::array<double, again> rests_again_{};

@@ -74,24 +74,23 @@ std::size_t index_below(std::uint64_t x, std::size_t n) {
 
 // ------------------------------------------------------------------------------------------------------------ out
 
-ChunkSource::ChunkSource(const Ports& ports, const Solid& solid, const Shell& shell, const AtomIndex& index, const Cover& cover)
-    : ports_(ports), solid_(solid), shell_(shell), index_(index), cover_(cover), history_(solid.contacts().width()) {
-  for (const auto& body : solid_.bodies().bodies()) bodies_.push_back(body.first);
+ChunkSource::ChunkSource(const Bed& bed, const Cover& cover) : bed_(bed), cover_(cover), history_(bed.solid.contacts().width()) {
+  for (const auto& body : bed_.solid.bodies().bodies()) bodies_.push_back(body.first);
   contacts_.clear(0);
 }
 
-std::uint64_t ChunkSource::identity(const Ports& ports, const Solid& solid, const Shell& shell) {
-  std::uint64_t sum = mixed(whole(ports.run.step), whole(ports.ranks.count));
-  solid.store().for_each([&](const Resident& g) { sum += mixed(whole(g.tag), g.body, g.position); });
-  for (int i = 0; i < ports.atoms.owned; ++i)
-    if (shell[i].locked) sum += mixed(whole(ports.atoms.tag[i]), shell[i].body, shell[i].place);
+std::uint64_t ChunkSource::identity(const Bed& bed) {
+  std::uint64_t sum = mixed(whole(bed.run.step), whole(bed.ranks.count));
+  bed.solid.store().for_each([&](const Resident& g) { sum += mixed(whole(g.tag), g.body, g.position); });
+  for (int i = 0; i < bed.atoms.owned; ++i)
+    if (bed.shell[i].locked) sum += mixed(whole(bed.atoms.tag[i]), bed.shell[i].body, bed.shell[i].place);
   std::uint64_t all = 0;
-  for (const std::uint64_t one : ports.ranks.gather(std::vector<std::uint64_t>{sum})) all = mixed(all, one);
+  for (const std::uint64_t one : bed.ranks.gather(std::vector<std::uint64_t>{sum})) all = mixed(all, one);
   return all;
 }
 
 bool ChunkSource::next(SectionChunk& chunk) {
-  chunk.rank = static_cast<std::uint64_t>(ports_.ranks.me);
+  chunk.rank = static_cast<std::uint64_t>(bed_.ranks.me);
   chunk.granules = 0;
   chunk.bytes.clear();
   if (!part_given_) {
@@ -99,13 +98,13 @@ bool ChunkSource::next(SectionChunk& chunk) {
     part_given_ = true;
     return true;
   }
-  if (atom_ < ports_.atoms.owned) interface_block(chunk);
+  if (atom_ < bed_.atoms.owned) interface_block(chunk);
   if (!chunk.bytes.empty()) return true;
-  if (slot_ < solid_.store().slots()) interior_block(chunk);
+  if (slot_ < bed_.solid.store().slots()) interior_block(chunk);
   if (!chunk.bytes.empty()) return true;
-  if (graph_contacts_ != solid_.contacts().size())
-    throw InternalError(std::to_string(solid_.contacts().size()) + " contacts are frozen and " + std::to_string(graph_contacts_) +
-                        " were written");
+  if (graph_contacts_ != bed_.solid.contacts().size())
+    throw InternalError(std::to_string(bed_.solid.contacts().size()) + " contacts are frozen and " +
+                        std::to_string(graph_contacts_) + " were written");
   return false;
 }
 
@@ -114,18 +113,18 @@ void ChunkSource::part(SectionChunk& chunk) {
   WordTable table;
   table.clear(part_columns);
   std::uint64_t* const row = table.add_row();
-  put(row + own_lo, ports_.run.own.lo);
-  put(row + own_hi, ports_.run.own.hi);
+  put(row + own_lo, bed_.run.own.lo);
+  put(row + own_hi, bed_.run.own.hi);
   put(row + observer, cover_.observer());
   put(row + observed_then, cover_.observed_then());
   pack_columns(table, chunk.bytes);
   table.clear(1);
-  for (int l = 0; l < ports_.atoms.layouts(); ++l)
-    for (const char c : ports_.atoms.layout_text(l) + "\n") *table.add_row() = static_cast<unsigned char>(c);
+  for (int l = 0; l < bed_.atoms.layouts(); ++l)
+    for (const char c : bed_.atoms.layout_text(l) + "\n") *table.add_row() = static_cast<unsigned char>(c);
   pack_columns(table, chunk.bytes);
   std::vector<double> numbers;
   table.clear(0);
-  for (const auto& body : solid_.bodies().bodies()) {
+  for (const auto& body : bed_.solid.bodies().bodies()) {
     SolidBody b = body.second;
     numbers.clear();
     b.each_number([&](auto& x) { numbers.push_back(static_cast<double>(x)); });
@@ -137,13 +136,13 @@ void ChunkSource::part(SectionChunk& chunk) {
 
 void ChunkSource::begin_block() {
   contacts_before_ += contacts_.rows;
-  contacts_.clear(c_history + solid_.contacts().width());
+  contacts_.clear(c_history + bed_.solid.contacts().width());
   granules_.clear(interface_columns);
   by_length_.clear();
 }
 
 void ChunkSource::contact(std::int64_t low, std::int64_t high, const double* history) {
-  const SolidBodies& living = solid_.bodies();
+  const SolidBodies& living = bed_.solid.bodies();
   const int body = living.body_of(low) ? living.body_of(low) : living.body_of(high);
   const auto at = std::lower_bound(bodies_.begin(), bodies_.end(), body);
   if (!body || at == bodies_.end() || *at != body)
@@ -159,34 +158,34 @@ void ChunkSource::contact(std::int64_t low, std::int64_t high, const double* his
 
 /// With granules that came before, and with those that are not on this rank.
 void ChunkSource::contacts_of(std::int64_t tag) {
-  const GranuleStore& store = solid_.store();
+  const GranuleStore& store = bed_.solid.store();
   const bool stored = store.contains(tag);
   const auto comes_later = [&](std::int64_t partner) {
     if (store.contains(partner)) return !stored || store.comes_before(tag, partner);
-    const int* i = stored ? nullptr : index_.find(partner);
-    return i && shell_[*i].locked && *i > index_.at(tag);
+    const int* i = stored ? nullptr : bed_.index.find(partner);
+    return i && bed_.shell[*i].locked && *i > bed_.index.at(tag);
   };
-  solid_.contacts().for_each(tag, [&](std::int64_t partner, const double* history) {
+  bed_.solid.contacts().for_each(tag, [&](std::int64_t partner, const double* history) {
     if (comes_later(partner)) return;
     const std::int64_t low = std::min(tag, partner), high = std::max(tag, partner);
     if (history) {
       history_.assign(history, history + history_.size());
-      if (tag != low) solid_.contacts().change_side(history_.data());
+      if (tag != low) bed_.solid.contacts().change_side(history_.data());
     }
     bool known = history != nullptr;
-    if (solid_.contacts().contains(low, high))
+    if (bed_.solid.contacts().contains(low, high))
       ++graph_contacts_;
     else
-      known = solid_.inner_history(*store.find(low), high, history_.data());
+      known = bed_.solid.inner_history(*store.find(low), high, history_.data());
     contact(low, high, known ? history_.data() : nullptr);
   });
 }
 
 void ChunkSource::interface_block(SectionChunk& chunk) {
   begin_block();
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   for (; atom_ < atoms.owned && granules_.rows < granules_per_chunk; ++atom_) {
-    const Locked& e = shell_[atom_];
+    const Locked& e = bed_.shell[atom_];
     if (!e.locked) continue;
     std::uint64_t* const row = granules_.add_row();
     row[i_tag] = whole(atoms.tag[atom_]);
@@ -227,7 +226,7 @@ void ChunkSource::interior_block(SectionChunk& chunk) {
     contacts_of(g.tag);
     ++chunk.granules;
   };
-  slot_ = solid_.store().visit_some(slot_, granules_per_chunk, add);
+  slot_ = bed_.solid.store().visit_some(slot_, granules_per_chunk, add);
   if (chunk.granules == 0) return;
   chunk.kind = SectionChunk::interior_granules;
   interior_ += chunk.granules;
@@ -260,7 +259,7 @@ auto ChunkReader::part(const SectionChunk& chunk) -> const Head& {
       text += c;
       continue;
     }
-    layout_.push_back(ports_.atoms.layout_from_text(text));
+    layout_.push_back(bed_.atoms.layout_from_text(text));
     text.clear();
   }
   unpack_columns(at, end, table);
@@ -314,7 +313,8 @@ const Parcel& ChunkReader::parcel(const SectionChunk& chunk) {
 void ChunkReader::read_contacts(const WordTable& table) {
   parcel_.edges.clear();
   parcel_.edges.reserve(table.rows);
-  if (table.rows && table.columns != c_history + width_) throw InternalError("a chunk of a restart file has other histories");
+  if (table.rows && table.columns != c_history + bed_.solid.contacts().width())
+    throw InternalError("a chunk of a restart file has other histories");
   numbers_of(table, histories_);
   for (std::size_t r = 0; r < table.rows; ++r) {
     const std::uint64_t* const row = table.row(r);
@@ -345,7 +345,7 @@ void ChunkReader::read_interior(const WordTable& table, std::vector<double>& num
     s.type = static_cast<int>(row[g_type]);
     s.layout = layout_[index_below(row[g_layout], layout_.size())];
     s.lock_step = static_cast<std::int64_t>(row[g_step]);
-    if (scales_.image_by_place()) s.lock_step = std::min(s.lock_step, StoreExchange::locked_long_ago);
+    if (bed_.scales.image_by_place()) s.lock_step = std::min(s.lock_step, StoreExchange::locked_long_ago);
     s.normal_load = number_of(row[g_normal]);
     s.load_change = vector_of(row + g_change);
     s.walls = static_cast<int>(row[g_walls]);

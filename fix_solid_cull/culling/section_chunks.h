@@ -6,13 +6,9 @@
 #include <memory>
 #include <vector>
 
-#include "atom_index.h"
+#include "bed.h"
 #include "cover.h"
 #include "parcels.h"
-#include "ports.h"
-#include "scales.h"
-#include "shell.h"
-#include "solid.h"
 #include "store_section.h"
 
 namespace solidcull {
@@ -20,14 +16,14 @@ namespace solidcull {
 /// Gives the chunks of this rank one by one. Nothing may change meanwhile. Local.
 class ChunkSource {
  public:
-  ChunkSource(const Ports& ports, const Solid& solid, const Shell& shell, const AtomIndex& index, const Cover& cover);
+  ChunkSource(const Bed& bed, const Cover& cover);
   /// False after the last one.
   bool next(SectionChunk& chunk);
   std::uint64_t interior() const { return interior_; }  ///< granules and contacts so far
   std::uint64_t interface_granules() const { return interface_; }
   std::uint64_t contacts() const { return contacts_.rows + contacts_before_; }
   /// A number that names what the chunks of this rank hold; costs a walk through all granules.
-  static std::uint64_t identity(const Ports& ports, const Solid& solid, const Shell& shell);
+  static std::uint64_t identity(const Bed& bed);
 
  private:
   void part(SectionChunk& chunk);
@@ -37,10 +33,7 @@ class ChunkSource {
   void contacts_of(std::int64_t tag);
   void contact(std::int64_t low, std::int64_t high, const double* history);
 
-  const Ports& ports_;
-  const Solid& solid_;
-  const Shell& shell_;
-  const AtomIndex& index_;
+  const Bed& bed_;
   const Cover& cover_;
   bool part_given_ = false;
   int atom_ = 0, slot_ = 0;
@@ -54,8 +47,7 @@ class ChunkSource {
 /// Reads chunks in the order of the file. Local.
 class ChunkReader {
  public:
-  /// width: numbers of a contact history.
-  ChunkReader(const Ports& ports, const Scales& scales, std::size_t width) : ports_(ports), scales_(scales), width_(width) {}
+  explicit ChunkReader(const Bed& bed) : bed_(bed) {}
 
   struct Head {
     Box own;  ///< the subdomain of the rank that wrote
@@ -70,9 +62,7 @@ class ChunkReader {
   void read_contacts(const WordTable& table);
   void read_interior(const WordTable& table, std::vector<double>& numbers);
 
-  const Ports& ports_;
-  const Scales& scales_;
-  std::size_t width_;
+  const Bed& bed_;
   Head head_;
   std::vector<int> layout_;
   Parcel parcel_;

@@ -36,16 +36,16 @@ void ShellClosure::merged(int gone, int kept, bool same_frame) {
 }
 
 ShellClosure::Foreign ShellClosure::as_foreign(int i) const {
-  const Locked& e = shell_[i];
+  const Locked& e = bed_.shell[i];
   const bool in_body = e.in_body();  // else it has just been chosen
   // bodies that stand do not touch what is stored in each other, but at sites
-  const bool stands = in_body && solid_.stands(e.body) && !scales_.refills();
-  return {ports_.atoms.sphere(i), in_body ? groups_.key_of(e.body) : 0, stands};
+  const bool stands = in_body && bed_.solid.stands(e.body) && !bed_.scales.refills();
+  return {bed_.atoms.sphere(i), in_body ? bed_.groups.key_of(e.body) : 0, stands};
 }
 
 void ShellClosure::share() {
   foreign_.clear();
-  if (!ports_.ranks.has_neighbours()) return;
+  if (!bed_.ranks.has_neighbours()) return;
   struct Row {
     Triple at;
     double radius;
@@ -53,56 +53,56 @@ void ShellClosure::share() {
     bool stands;
   };
   std::vector<Row> rows;
-  for (int i = 0; i < ports_.atoms.owned; ++i) {
-    if (shell_[i].locked && !census_.several_bodies()) continue;
+  for (int i = 0; i < bed_.atoms.owned; ++i) {
+    if (bed_.shell[i].locked && !bed_.census.several_bodies()) continue;
     const Foreign f = as_foreign(i);
     rows.push_back({triple(f.sphere.centre), f.sphere.radius, f.body, f.stands});
   }
-  const double reach = contact_reach(ports_, solid_) + store_gap_in_skins * ports_.run.skin + stored_.slack();
-  for (const Row& r : ports_.ranks.exchange(rows, reach)) foreign_.push_back({{vec(r.at), r.radius}, r.body, r.stands});
+  const double reach = contact_reach(bed_) + store_gap_in_skins * bed_.run.skin + bed_.stored.slack();
+  for (const Row& r : bed_.ranks.exchange(rows, reach)) foreign_.push_back({{vec(r.at), r.radius}, r.body, r.stands});
 }
 
 ShellClosure::Overlapped ShellClosure::by_new_granules() const {
   Overlapped found;
-  if (!ports_.ranks.any(some_made_)) return found;
+  if (!bed_.ranks.any(some_made_)) return found;
   struct Row {
     Triple at;
     double radius;
     std::int64_t tag;
   };
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   std::vector<Row> rows;
   for (int i = 0; some_made_ && i < atoms.owned; ++i)
     if (rows_[i].made) rows.push_back({triple(atoms.place(i)), atoms.radius[i], atoms.tag[i]});
-  const std::vector<Row> others = ports_.ranks.exchange(rows, contact_reach(ports_, solid_) + stored_.slack());
+  const std::vector<Row> others = bed_.ranks.exchange(rows, contact_reach(bed_) + bed_.stored.slack());
   rows.insert(rows.end(), others.begin(), others.end());
   std::vector<Sphere> made;
   for (const Row& r : rows) {
     made.push_back({vec(r.at), r.radius});
-    stored_.for_each_near(made.back(), 0, [&](const Resident& g) {
+    bed_.stored.for_each_near(made.back(), 0, [&](const Resident& g) {
       found.in_stored = r.tag;
-      found.places.push_back(solid_.in_world(g));
+      found.places.push_back(bed_.solid.in_world(g));
     });
   }
   SphereCells cells;
-  cells.build(std::move(made), 2 * scales_.diameter());
+  cells.build(std::move(made), 2 * bed_.scales.diameter());
   for (int i = 0; i < atoms.owned; ++i)
-    if (shell_.locked(i) && cells.any_near(atoms.sphere(i), 0)) found.places.push_back(atoms.place(i));
-  ports_.ranks.largest(&found.in_stored, 1);
+    if (bed_.shell.locked(i) && cells.any_near(atoms.sphere(i), 0)) found.places.push_back(atoms.place(i));
+  bed_.ranks.largest(&found.in_stored, 1);
   return found;
 }
 
 void ShellClosure::forget_new() {
   if (!some_made_) return;
   some_made_ = false;
-  for (int i = 0; i < ports_.atoms.owned; ++i) rows_[i].made = false;
+  for (int i = 0; i < bed_.atoms.owned; ++i) rows_[i].made = false;
 }
 
 /// Nothing that is stored in a frame that stands was within store_gap_in_skins of it when it was last looked at; since then it
 /// has hardly moved, and only what is as far from all exterior granules went to the store.
 bool ShellClosure::is_clear(int i) const {
-  const double way = clear_way_in_skins * ports_.run.skin;
-  return rows_[i].version == solid_.standing_version() && (ports_.atoms.place(i) - rows_[i].at).squaredNorm() < way * way;
+  const double way = clear_way_in_skins * bed_.run.skin;
+  return rows_[i].version == bed_.solid.standing_version() && (bed_.atoms.place(i) - rows_[i].at).squaredNorm() < way * way;
 }
 
 // ------------------------------------------------------------------------------------------------- what comes near stored
@@ -118,14 +118,14 @@ struct ShellClosure::Frame {
 /// Frames of the store, with boxes around all of them and around those that move.
 class ShellClosure::Frames {
  public:
-  Frames(const ShellClosure& c, double gap) : shifts_(c.ports_.ranks.image_shifts()) {
-    const Solid& solid = c.solid_;
+  Frames(const ShellClosure& c, double gap) : shifts_(c.bed_.ranks.image_shifts()) {
+    const Solid& solid = c.bed_.solid;
     solid.store().for_each_frame([&](int frame, const Vec3& own_lo, const Vec3& own_hi) {
       const Pose& pose = solid.pose_of_frame(frame);
       const Vec3 half =
           turned_half_box(pose.turn(), 0.5 * (own_hi - own_lo)) + Vec3::Constant(solid.store().largest_radius() + gap);
       const Frame f{frame,
-                    frame == GranuleStore::shared_frame ? no_key : c.groups_.key_of(frame),
+                    frame == GranuleStore::shared_frame ? no_key : c.bed_.groups.key_of(frame),
                     solid.frame_stands(frame),
                     &pose,
                     pose.to_world(0.5 * (own_lo + own_hi)),
@@ -178,10 +178,10 @@ std::vector<ShellClosure::Visitor> ShellClosure::visitors(const Frames& frames) 
   };
   for (const Foreign& f : foreign_)
     if (!frames.far_from_all(f.sphere.centre, f.sphere.radius)) comes({f, -1, false});
-  for (int i = 0; i < ports_.atoms.owned; ++i) {
-    const bool locked = shell_[i].locked, clear = !locked && is_clear(i);
-    if ((locked && !census_.several_bodies()) || (clear && frames.none_moves()) ||
-        frames.far_from_all(ports_.atoms.place(i), ports_.atoms.radius[i]))
+  for (int i = 0; i < bed_.atoms.owned; ++i) {
+    const bool locked = bed_.shell[i].locked, clear = !locked && is_clear(i);
+    if ((locked && !bed_.census.several_bodies()) || (clear && frames.none_moves()) ||
+        frames.far_from_all(bed_.atoms.place(i), bed_.atoms.radius[i]))
       continue;
     comes({as_foreign(i), locked ? -1 : i, clear});
   }
@@ -189,22 +189,22 @@ std::vector<ShellClosure::Visitor> ShellClosure::visitors(const Frames& frames) 
 }
 
 void ShellClosure::find_near_granules(std::set<std::int64_t>& near) {
-  const double skin = ports_.run.skin, gap = store_gap_in_skins * skin;
+  const double skin = bed_.run.skin, gap = store_gap_in_skins * skin;
   const Frames frames(*this, gap);
   std::vector<Visitor> all = visitors(frames);
   std::vector<Sphere> places;
   for (const Visitor& v : all) places.push_back(v.who.sphere);
   SphereCells cells;
-  cells.build(std::move(places), 2 * scales_.diameter() + gap);
+  cells.build(std::move(places), 2 * bed_.scales.diameter() + gap);
   for (const Frame& f : frames.all()) {
     const Vec3 half = f.half + Vec3::Constant(cells.largest_radius());
-    for (const Vec3& shift : ports_.ranks.image_shifts())
+    for (const Vec3& shift : bed_.ranks.image_shifts())
       cells.for_each_in_box(f.middle - half - shift, f.middle + half - shift, [&](std::size_t k, const Sphere& s) {
         Visitor& v = all[k];
         if (v.who.body == f.key || (f.stands && (v.who.stands || v.clear))) return true;
         const Vec3 at = f.pose->to_frame(s.centre + shift);
-        solid_.store().for_each_near(f.number, {at, s.radius}, gap, [&](const Resident& g) {
-          if (v.who.body && groups_.key_of(g.body) == v.who.body) return;  // in the frame that bodies share
+        bed_.solid.store().for_each_near(f.number, {at, s.radius}, gap, [&](const Resident& g) {
+          if (v.who.body && bed_.groups.key_of(g.body) == v.who.body) return;  // in the frame that bodies share
           const double reach = s.radius + g.radius + skin;
           if ((g.position - at).squaredNorm() < reach * reach) near.insert(g.tag);
           if (f.stands) v.atom = -1;
@@ -213,21 +213,21 @@ void ShellClosure::find_near_granules(std::set<std::int64_t>& near) {
       });
   }
   for (const Visitor& v : all)
-    if (v.atom >= 0 && !v.clear) rows_[v.atom] = {solid_.standing_version(), false, v.who.sphere.centre};
+    if (v.atom >= 0 && !v.clear) rows_[v.atom] = {bed_.solid.standing_version(), false, v.who.sphere.centre};
 }
 
 /// Walls and bodies are compared when they have moved against each other since the last time, and at the start of a run.
 void ShellClosure::find_near_walls(std::set<std::int64_t>& near) {
   if (new_run_) seen_walls_.clear();
-  const double skin = ports_.run.skin, gap = wall_gap_in_skins * skin, enough = wall_check_in_skins * skin;
-  const std::vector<WallTriangle> triangles = ports_.walls.triangles();
-  const Vec3 reach = Vec3::Constant(solid_.store().largest_radius() + gap);
+  const double skin = bed_.run.skin, gap = wall_gap_in_skins * skin, enough = wall_check_in_skins * skin;
+  const std::vector<WallTriangle> triangles = bed_.walls.triangles();
+  const Vec3 reach = Vec3::Constant(bed_.solid.store().largest_radius() + gap);
   std::vector<int> moved;  // frames that are to be compared with what stands still
-  solid_.store().for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
-    const Pose& pose = solid_.pose_of_frame(frame);
+  bed_.solid.store().for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
+    const Pose& pose = bed_.solid.pose_of_frame(frame);
     const auto known = seen_walls_.find(frame);
     // walls that hold a body may have stored granules of it at them
-    const bool at_walls = scales_.sleeping() && solid_.frame_stands(frame) && !new_run_;
+    const bool at_walls = bed_.scales.sleeping() && bed_.solid.frame_stands(frame) && !new_run_;
     const bool against_still =
         !at_walls && (known == seen_walls_.end() || largest_way(known->second.pose, pose, lo, hi) >= enough);
     // what moves is seen from the body: a wall that turns with it stays where it is
@@ -245,11 +245,11 @@ void ShellClosure::find_near_walls(std::set<std::int64_t>& near) {
     if (against_moving) seen.corners = std::move(corners);
     for (const WallTriangle& t : triangles)
       if (t.moving ? against_moving : against_still)
-        stored_.for_each_in_box(
+        bed_.stored.for_each_in_box(
             t.box.lo - reach, t.box.hi + reach,
             [&](const Resident& g) {
-              const Vec3 x = solid_.nearest_image(solid_.in_world(g), 0.5 * (t.box.lo + t.box.hi));
-              if (!near.count(g.tag) && ports_.walls.near(t, {x, g.radius}, gap)) near.insert(g.tag);
+              const Vec3 x = bed_.solid.nearest_image(bed_.solid.in_world(g), 0.5 * (t.box.lo + t.box.hi));
+              if (!near.count(g.tag) && bed_.walls.near(t, {x, g.radius}, gap)) near.insert(g.tag);
             },
             frame);
   });
@@ -258,15 +258,15 @@ void ShellClosure::find_near_walls(std::set<std::int64_t>& near) {
 
 void ShellClosure::find_near_primitives(const std::vector<int>& frames, std::set<std::int64_t>& near) const {
   if (frames.empty()) return;
-  const double gap = wall_gap_in_skins * ports_.run.skin;
-  solid_.store().for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
+  const double gap = wall_gap_in_skins * bed_.run.skin;
+  bed_.solid.store().for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
     if (std::find(frames.begin(), frames.end(), frame) == frames.end()) return;
     // a ball around all of them first
-    const Sphere all{solid_.pose_of_frame(frame).to_world(0.5 * (lo + hi)),
-                     0.5 * (hi - lo).norm() + solid_.store().largest_radius()};
-    if (!ports_.walls.primitive_near(all, gap)) return;
-    solid_.store().for_each_in_box(frame, lo, hi, [&](const Resident& g) {
-      if (ports_.walls.primitive_near({solid_.in_world(g), g.radius}, gap)) near.insert(g.tag);
+    const Sphere all{bed_.solid.pose_of_frame(frame).to_world(0.5 * (lo + hi)),
+                     0.5 * (hi - lo).norm() + bed_.solid.store().largest_radius()};
+    if (!bed_.walls.primitive_near(all, gap)) return;
+    bed_.solid.store().for_each_in_box(frame, lo, hi, [&](const Resident& g) {
+      if (bed_.walls.primitive_near({bed_.solid.in_world(g), g.radius}, gap)) near.insert(g.tag);
     });
   });
 }
@@ -275,35 +275,35 @@ std::size_t ShellClosure::fetch_what_is_near() {
   std::set<std::int64_t> near;
   find_near_granules(near);
   find_near_walls(near);
-  for (const Box& box : opened(ports_.run.skin))
-    stored_.for_each_in_box(box.lo, box.hi, [&](const Resident& g) { near.insert(g.tag); });
+  for (const Box& box : opened(bed_.run.skin))
+    bed_.stored.for_each_in_box(box.lo, box.hi, [&](const Resident& g) { near.insert(g.tag); });
   for (const std::int64_t tag : near) exchange_.bring_back(tag);
   return near.size();
 }
 
 /// Where everything is to be an atom, whatever is near: `gap` wider than it must be.
 std::vector<Box> ShellClosure::opened(double gap) const {
-  const double largest = solid_.store().largest_radius();
-  std::vector<Box> all = ports_.insertions.counting(largest + gap);
-  for (const Box& box : ports_.insertions.due_boxes(largest)) all.push_back(box.grown_by(gap));
+  const double largest = bed_.solid.store().largest_radius();
+  std::vector<Box> all = bed_.insertions.counting(largest + gap);
+  for (const Box& box : bed_.insertions.due_boxes(largest)) all.push_back(box.grown_by(gap));
   return all;
 }
 
 std::size_t ShellClosure::fetch_from_outside() {
-  const Run& run = ports_.run;
+  const Run& run = bed_.run;
   const auto outside = [&](const Vec3& x, double margin) {
     return (x.array() - margin < run.kept.lo.array()).any() || (x.array() + margin >= run.kept.hi.array()).any();
   };
   std::vector<std::int64_t> leaving;
-  solid_.store().for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
-    if (solid_.frame_stands(frame)) return;
-    const Pose& pose = solid_.pose_of_frame(frame);
+  bed_.solid.store().for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
+    if (bed_.solid.frame_stands(frame)) return;
+    const Pose& pose = bed_.solid.pose_of_frame(frame);
     if (!outside(pose.to_world(0.5 * (lo + hi)), 0.5 * (hi - lo).norm())) return;
     // the ball around them may stick out where they do not
     const Vec3 half = turned_half_box(pose.turn(), 0.5 * (hi - lo)), middle = pose.to_world(0.5 * (lo + hi));
     if (!outside(middle - half, 0) && !outside(middle + half, 0)) return;
-    solid_.store().for_each_in_box(frame, lo, hi, [&](const Resident& g) {
-      if (outside(solid_.in_world(g), 0)) leaving.push_back(g.tag);
+    bed_.solid.store().for_each_in_box(frame, lo, hi, [&](const Resident& g) {
+      if (outside(bed_.solid.in_world(g), 0)) leaving.push_back(g.tag);
     });
   });
   for (const std::int64_t tag : leaving) exchange_.bring_back(tag);
@@ -317,9 +317,9 @@ std::size_t ShellClosure::fetch_from_outside() {
 bool ShellClosure::may_leave_its_walls(int i) const {
   const AtWall& wall = walls_[i];
   if (!wall.near) return true;
-  if (scales_.refills()) return false;
-  const Locked& e = shell_[i];
-  return scales_.sleeping() && !wall.moving_near && solid_.stands(e.body) && e.came_back != ports_.run.step && !e.fresh &&
+  if (bed_.scales.refills()) return false;
+  const Locked& e = bed_.shell[i];
+  return bed_.scales.sleeping() && !wall.moving_near && bed_.solid.stands(e.body) && e.came_back != bed_.run.step && !e.fresh &&
          !new_run_;
 }
 
@@ -329,19 +329,19 @@ void ShellClosure::leave_out_near_meshes(std::vector<int>& atoms) const {
   std::vector<Sphere> spheres;
   std::vector<int> of;
   for (const int i : atoms)
-    if (!solid_.stands(shell_[i].body)) {
-      spheres.push_back(ports_.atoms.sphere(i));
+    if (!bed_.solid.stands(bed_.shell[i].body)) {
+      spheres.push_back(bed_.atoms.sphere(i));
       of.push_back(i);
     }
   if (spheres.empty()) return;
   SphereCells cells;
-  cells.build(std::move(spheres), 2 * scales_.diameter());
-  const double skin = ports_.run.skin;
+  cells.build(std::move(spheres), 2 * bed_.scales.diameter());
+  const double skin = bed_.run.skin;
   const Vec3 reach = Vec3::Constant(cells.largest_radius() + skin);
   std::set<int> near;
-  for (const WallTriangle& t : ports_.walls.triangles())
+  for (const WallTriangle& t : bed_.walls.triangles())
     cells.for_each_in_box(t.box.lo - reach, t.box.hi + reach, [&](std::size_t k, const Sphere& s) {
-      if (!near.count(of[k]) && ports_.walls.near(t, s, skin)) near.insert(of[k]);
+      if (!near.count(of[k]) && bed_.walls.near(t, s, skin)) near.insert(of[k]);
       return true;
     });
   atoms.erase(std::remove_if(atoms.begin(), atoms.end(), [&](int i) { return near.count(i) != 0; }), atoms.end());
@@ -352,16 +352,16 @@ bool ShellClosure::ask_to_store(const std::vector<int>& interface_atoms) {
   std::size_t may_go = 0;
   for (const int i : interface_atoms) may_go += may_leave_its_walls(i);
   const double gain = static_cast<double>(may_go) - static_cast<double>(stay_near_);
-  store_asked_ = gain > std::max(worth_of_a_build * ports_.atoms.owned, least_worth);
+  store_asked_ = gain > std::max(worth_of_a_build * bed_.atoms.owned, least_worth);
   return store_asked_;
 }
 
 /// What an interface granule may have near it: exterior granules, shells and stored granules of other bodies, insertions.
 class ShellClosure::Surroundings {
  public:
-  explicit Surroundings(const ShellClosure& c) : c_(c), gap_(store_gap_in_skins * c.ports_.run.skin) {
+  explicit Surroundings(const ShellClosure& c) : c_(c), gap_(store_gap_in_skins * c.bed_.run.skin) {
     std::vector<Sphere> exterior, shells;
-    const bool several = c.census_.several_bodies();
+    const bool several = c.bed_.census.several_bodies();
     const auto sort_in = [&](const Foreign& f) {
       if (!f.body) {
         exterior.push_back(f.sphere);
@@ -370,14 +370,14 @@ class ShellClosure::Surroundings {
         of_shell_.push_back(f);
       }
     };
-    for (int i = 0; i < c.ports_.atoms.owned; ++i) sort_in(c.as_foreign(i));
+    for (int i = 0; i < c.bed_.atoms.owned; ++i) sort_in(c.as_foreign(i));
     for (const Foreign& f : c.foreign_) sort_in(f);
-    exterior_.build(std::move(exterior), 2 * c.scales_.diameter());
-    shells_.build(std::move(shells), 2 * c.scales_.diameter());
+    exterior_.build(std::move(exterior), 2 * c.bed_.scales.diameter());
+    shells_.build(std::move(shells), 2 * c.bed_.scales.diameter());
     if (several) find_others();
     opened_ = c.opened(gap_);
   }
-  bool near(int i) const { return near(i, c_.ports_.atoms.sphere(i)); }
+  bool near(int i) const { return near(i, c_.bed_.atoms.sphere(i)); }
   /// The same if atom i was there.
   bool near(int i, const Sphere& there) const {
     return exterior_.any_near(there, gap_) || near_another_body(i, there) || is_open(there.centre);
@@ -390,35 +390,35 @@ class ShellClosure::Surroundings {
   /// The largest body is everywhere: it asks whether it is near one of the others. Of these there may be thousands of few
   /// granules.
   void find_others() {
-    const SolidBodies& bodies = c_.solid_.bodies();
+    const SolidBodies& bodies = c_.bed_.solid.bodies();
     std::size_t most = 0;
     for (const auto& [number, body] : bodies.bodies())
       if (static_cast<std::size_t>(body.mass.count) > most)
-        most = static_cast<std::size_t>(body.mass.count), largest_ = c_.groups_.key_of(number);
-    const GranuleStore& store = c_.solid_.store();
+        most = static_cast<std::size_t>(body.mass.count), largest_ = c_.bed_.groups.key_of(number);
+    const GranuleStore& store = c_.bed_.solid.store();
     std::vector<Sphere> small;
     store.for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
-      if (c_.groups_.key_of(body) == largest_) return;
+      if (c_.bed_.groups.key_of(body) == largest_) return;
       const Pose& pose = bodies.pose(body);
       const Vec3 half = turned_half_box(pose.turn(), 0.5 * (hi - lo)) + Vec3::Constant(store.largest_radius());
       const Vec3 middle = pose.to_world(0.5 * (lo + hi));
-      if (half.norm() < c_.scales_.diameter())
+      if (half.norm() < c_.bed_.scales.diameter())
         small.push_back({middle, half.norm()});  // it holds their spheres
       else
         others_.push_back({middle - half, middle + half});
     });
-    small_others_.build(std::move(small), 2 * c_.scales_.diameter());
+    small_others_.build(std::move(small), 2 * c_.bed_.scales.diameter());
   }
   bool is_open(const Vec3& x) const {
     return std::any_of(opened_.begin(), opened_.end(), [&](const Box& box) { return box.holds(x); });
   }
   bool near_another_body(int i, const Sphere& s) const {
-    if (!c_.census_.several_bodies()) return false;
+    if (!c_.bed_.census.several_bodies()) return false;
     const Foreign self = c_.as_foreign(i);
     // bodies that both stand still may be as near as they like, but what they do to each other needs two atoms
     const auto touches = [&](const Sphere& other) {
-      const double reach = c_.ports_.contacts.reach_factor * (s.radius + other.radius);
-      return (c_.solid_.nearest_image(other.centre, s.centre) - s.centre).squaredNorm() < reach * reach;
+      const double reach = c_.bed_.contacts.reach_factor * (s.radius + other.radius);
+      return (c_.bed_.solid.nearest_image(other.centre, s.centre) - s.centre).squaredNorm() < reach * reach;
     };
     if (shells_.any_near(s, gap_, [&](std::size_t k) {
           const Foreign& other = of_shell_[k];
@@ -426,19 +426,19 @@ class ShellClosure::Surroundings {
         }))
       return true;
     const double reach = s.radius + gap_;
-    const bool images = c_.ports_.ranks.image_shifts().size() > 1;
+    const bool images = c_.bed_.ranks.image_shifts().size() > 1;
     if (self.body == largest_ && !images && !small_others_.any_near(s, gap_) &&
         std::none_of(others_.begin(), others_.end(), [&](const Extent& e) {
           return (s.centre.array() > e.lo.array() - reach).all() && (s.centre.array() < e.hi.array() + reach).all();
         }))
       return false;
     bool near = false;
-    c_.stored_.for_each_near(
+    c_.bed_.stored.for_each_near(
         s, gap_,
         [&](const Resident& g) {
-          near = near || !(self.stands && c_.solid_.stands(g.body)) || touches({c_.solid_.in_world(g), g.radius});
+          near = near || !(self.stands && c_.bed_.solid.stands(g.body)) || touches({c_.bed_.solid.in_world(g), g.radius});
         },
-        [&](int body) { return self.body && c_.groups_.key_of(body) == self.body; });
+        [&](int body) { return self.body && c_.bed_.groups.key_of(body) == self.body; });
     return near;
   }
 
@@ -453,21 +453,21 @@ class ShellClosure::Surroundings {
 };
 
 std::size_t ShellClosure::store_what_is_deep(bool locked_now, bool membership_changes) {
-  const bool asked = ports_.ranks.any(locked_now || store_asked_);
+  const bool asked = bed_.ranks.any(locked_now || store_asked_);
   store_asked_ = false;
-  if (!asked && (!scales_.sleeping() || ++builds_without_storing_ < builds_between_storing)) return 0;
+  if (!asked && (!bed_.scales.sleeping() || ++builds_without_storing_ < builds_between_storing)) return 0;
   builds_without_storing_ = 0;
   // the highest tag must stay an atom: new atoms are numbered from it
   std::int64_t highest = 0;
-  for (int i = 0; i < ports_.atoms.owned; ++i) highest = std::max<std::int64_t>(highest, ports_.atoms.tag[i]);
-  ports_.ranks.largest(&highest, 1);
-  if (!locked_now && !scales_.sleeping()) return 0;
+  for (int i = 0; i < bed_.atoms.owned; ++i) highest = std::max<std::int64_t>(highest, bed_.atoms.tag[i]);
+  bed_.ranks.largest(&highest, 1);
+  if (!locked_now && !bed_.scales.sleeping()) return 0;
 
   const Surroundings surroundings(*this);
   std::vector<int> deep;
   stay_near_ = 0;
-  for (int i = ports_.atoms.owned - 1; i >= 0; --i) {
-    if (!shell_[i].locked || !may_leave_its_walls(i) || ports_.atoms.tag[i] == highest) continue;
+  for (int i = bed_.atoms.owned - 1; i >= 0; --i) {
+    if (!bed_.shell[i].locked || !may_leave_its_walls(i) || bed_.atoms.tag[i] == highest) continue;
     if (surroundings.near(i))
       ++stay_near_;
     else
@@ -475,24 +475,24 @@ std::size_t ShellClosure::store_what_is_deep(bool locked_now, bool membership_ch
   }
   leave_out_near_meshes(deep);
   // where nothing else changes, a few wait for more
-  if (!membership_changes && static_cast<double>(deep.size()) < store_share * ports_.atoms.owned) return 0;
-  if (scales_.refills()) return put_away_at_sites(deep, surroundings);
-  solid_.expects(deep.size());
-  const int left = ports_.atoms.owned - static_cast<int>(deep.size());
+  if (!membership_changes && static_cast<double>(deep.size()) < store_share * bed_.atoms.owned) return 0;
+  if (bed_.scales.refills()) return put_away_at_sites(deep, surroundings);
+  bed_.solid.expects(deep.size());
+  const int left = bed_.atoms.owned - static_cast<int>(deep.size());
   for (std::size_t k = 0; k < deep.size(); ++k) {
     exchange_.put_away(deep[k]);
-    if ((k + 1) % rows_at_once == 0) ports_.memory.give_rows_back(left);
+    if ((k + 1) % rows_at_once == 0) bed_.memory.give_rows_back(left);
   }
   return deep.size();
 }
 
 /// Where no site will do they stay.
 std::size_t ShellClosure::put_away_at_sites(const std::vector<int>& deep, const Surroundings& surroundings) {
-  const double wall_gap = (wall_gap_in_skins + wall_check_in_skins) * ports_.run.skin;
-  const SiteChoice choice(ports_, scales_, solid_, shell_, deep, wall_gap, [&](int i, const Sphere& there) {
+  const double wall_gap = (wall_gap_in_skins + wall_check_in_skins) * bed_.run.skin;
+  const SiteChoice choice(bed_, deep, wall_gap, [&](int i, const Sphere& there) {
     // where it would lie: through a periodic side others are near than beyond it
-    const Sphere in_box{ports_.run.wrapped(there.centre), there.radius};
-    return ports_.ranks.owns(in_box.centre) && !surroundings.near(i, in_box);
+    const Sphere in_box{bed_.run.wrapped(there.centre), there.radius};
+    return bed_.ranks.owns(in_box.centre) && !surroundings.near(i, in_box);
   });
   std::size_t went = 0;
   for (std::size_t k = 0; k < deep.size(); ++k)

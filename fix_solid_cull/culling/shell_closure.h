@@ -7,15 +7,10 @@
 #include <set>
 #include <vector>
 
-#include "body_groups.h"
-#include "census.h"
+#include "bed.h"
 #include "per_granule.h"
-#include "ports.h"
-#include "shell.h"
-#include "solid.h"
 #include "sphere_cells.h"
 #include "store_exchange.h"
-#include "stored_search.h"
 #include "wall_survey.h"
 
 namespace solidcull {
@@ -34,17 +29,7 @@ struct Cleared {
 
 class ShellClosure : public BodyFollower {
  public:
-  ShellClosure(const Ports& ports, const Scales& scales, Solid& solid, const Shell& shell, const BodyGroups& groups,
-               const StoredSearch& stored, const Census& census, const WallSurvey& walls, StoreExchange& exchange)
-      : ports_(ports),
-        scales_(scales),
-        solid_(solid),
-        shell_(shell),
-        groups_(groups),
-        stored_(stored),
-        census_(census),
-        walls_(walls),
-        exchange_(exchange) {}
+  ShellClosure(Bed& bed, const WallSurvey& walls, StoreExchange& exchange) : bed_(bed), walls_(walls), exchange_(exchange) {}
 
   PerGranule<Cleared>& rows() { return rows_; }
   void unlocked(int i) { rows_[i].version = Cleared::never; }
@@ -116,13 +101,7 @@ class ShellClosure : public BodyFollower {
   void leave_out_near_meshes(std::vector<int>& atoms) const;
   std::size_t put_away_at_sites(const std::vector<int>& deep, const Surroundings& surroundings);
 
-  const Ports& ports_;
-  const Scales& scales_;
-  Solid& solid_;
-  const Shell& shell_;
-  const BodyGroups& groups_;
-  const StoredSearch& stored_;
-  const Census& census_;
+  Bed& bed_;
   const WallSurvey& walls_;
   StoreExchange& exchange_;
 

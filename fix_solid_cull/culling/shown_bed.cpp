@@ -30,7 +30,7 @@ std::uint64_t ShownBed::sum_of(const std::vector<double>& record) const {
 }
 
 void ShownBed::show() {
-  names_.assign(static_cast<std::size_t>(ports_.atoms.room), Name());
+  names_.assign(static_cast<std::size_t>(bed_.atoms.room), Name());
   granules_.clear();
   interface_.clear();
   shown_ = true;
@@ -39,43 +39,43 @@ void ShownBed::show() {
 }
 
 void ShownBed::show_interface() {
-  Atoms& atoms = ports_.atoms;
+  Atoms& atoms = bed_.atoms;
   for (int i = 0; i < atoms.owned; ++i) {
-    if (!shell_.locked(i)) continue;
-    const Locked& e = shell_[i];
+    if (!bed_.shell.locked(i)) continue;
+    const Locked& e = bed_.shell[i];
     interface_.push_back({e, atoms.velocity(i), atoms.spin(i)});
-    if (e.lock_step == ports_.run.step) {  // no step has passed since: the deck sees the motion that it had
+    if (e.lock_step == bed_.run.step) {  // no step has passed since: the deck sees the motion that it had
       atoms.set_velocity(i, e.velocity);
-      if (ports_.contacts.turn_granules) atoms.set_spin(i, e.spin);
+      if (bed_.contacts.turn_granules) atoms.set_spin(i, e.spin);
     }
     note(i, false, 0);
   }
 }
 
 void ShownBed::show_stored() {
-  Atoms& atoms = ports_.atoms;
-  const bool by_place = !ports_.run.any_periodic() || scales_.image_by_place();
-  const Vec3 middle = 0.5 * (ports_.run.box.lo + ports_.run.box.hi);
+  Atoms& atoms = bed_.atoms;
+  const bool by_place = !bed_.run.any_periodic() || bed_.scales.image_by_place();
+  const Vec3 middle = 0.5 * (bed_.run.box.lo + bed_.run.box.hi);
   motion_words_.clear();
-  solid_.store().for_each_record([&](const StoredGranule& g, const std::vector<double>& record, bool transient_known) {
+  bed_.solid.store().for_each_record([&](const StoredGranule& g, const std::vector<double>& record, bool transient_known) {
     const int i = atoms.put_back(record, g.layout);
-    if (motion_words_.empty()) motion_words_ = atoms.motion_words(i, by_place, ports_.contacts.turn_granules);
+    if (motion_words_.empty()) motion_words_ = atoms.motion_words(i, by_place, bed_.contacts.turn_granules);
     if (!transient_known) {
-      const SolidBody& body = solid_.bodies().body(g.body);
+      const SolidBody& body = bed_.solid.bodies().body(g.body);
       const Vec3 x = body.pose.to_world(g.position);
-      atoms.set_place(i, solid_.nearest_image(x, scales_.image_by_place() ? middle : atoms.place(i)));
+      atoms.set_place(i, bed_.solid.nearest_image(x, bed_.scales.image_by_place() ? middle : atoms.place(i)));
       atoms.set_velocity(i, body.twist.at(x));
-      if (ports_.contacts.turn_granules) atoms.set_spin(i, body.twist.spin);
+      if (bed_.contacts.turn_granules) atoms.set_spin(i, body.twist.spin);
     }
-    shell_.label(i, groups_.key_of(g.body));
+    bed_.shell.label(i, bed_.groups.key_of(g.body));
     note(i, true, sum_of(record));
     atoms.mark_interface(i, false);
   });
 }
 
 void ShownBed::note(int i, bool stored, std::uint64_t sum) {
-  const Atoms& atoms = ports_.atoms;
-  names_[static_cast<std::size_t>(i)] = {ports_.ranks.me, static_cast<std::int32_t>(granules_.size())};
+  const Atoms& atoms = bed_.atoms;
+  names_[static_cast<std::size_t>(i)] = {bed_.ranks.me, static_cast<std::int32_t>(granules_.size())};
   granules_.push_back({atoms.tag[i], stored, false, atoms.place(i), atoms.velocity(i), atoms.spin(i), atoms.radius[i],
                        atoms.mass[i], atoms.type[i], sum});
 }
@@ -100,11 +100,11 @@ ShownBed::KnownContacts ShownBed::contacts_of(const HistoryRows& rows, int i, st
 
 /// With other locked granules of its body; without those that have no history.
 ShownBed::KnownContacts ShownBed::contacts_in_body(std::int64_t tag, bool stored, int body) const {
-  const FrozenContacts& frozen = solid_.contacts();
+  const FrozenContacts& frozen = bed_.solid.contacts();
   KnownContacts c{tag, {}, {}};
   std::vector<double> history(frozen.width());
   const auto add = [&](std::int64_t partner) {
-    frozen.turn(history.data(), solid_.bodies().pose(body).turn());
+    frozen.turn(history.data(), bed_.solid.bodies().pose(body).turn());
     c.partners.push_back(partner);
     c.numbers.insert(c.numbers.end(), history.begin(), history.end());
   };
@@ -114,43 +114,43 @@ ShownBed::KnownContacts ShownBed::contacts_in_body(std::int64_t tag, bool stored
     add(partner);
   });
   if (!stored) return c;
-  const auto granule = solid_.store().find(tag);
+  const auto granule = bed_.solid.store().find(tag);
   frozen.for_each_elsewhere(tag, [&](std::int64_t partner) {
-    if (solid_.inner_history(*granule, partner, history.data())) add(partner);
+    if (bed_.solid.inner_history(*granule, partner, history.data())) add(partner);
   });
   return c;
 }
 
 void ShownBed::give(int i, const KnownContacts& contacts) {
-  const std::size_t width = solid_.contacts().width();
+  const std::size_t width = bed_.solid.contacts().width();
   std::vector<Contacts::History> rows;
   for (std::size_t k = 0; k < contacts.partners.size(); ++k)
     rows.push_back({contacts.partners[k], contacts.numbers.data() + k * width});
-  ports_.contacts.give_histories(i, rows.data(), rows.size());
+  bed_.contacts.give_histories(i, rows.data(), rows.size());
 }
 
 void ShownBed::give_contacts() {
   outer_.clear();
-  if (!shown_ || solid_.contacts().width() == 0) return;
+  if (!shown_ || bed_.solid.contacts().width() == 0) return;
   AtomIndex atoms;  // guests are in none of the culling's own
-  atoms.index(ports_.atoms);
-  const HistoryRows rows = ports_.contacts.histories();
+  atoms.index(bed_.atoms);
+  const HistoryRows rows = bed_.contacts.histories();
   for (std::size_t k = 0; k < granules_.size(); ++k) {
     const Shown& s = granules_[k];
     const int* i = atoms.find(s.tag);
     if (!i) continue;  // the deck has deleted it, or sent it to another rank
     if (!s.stored) outer_.push_back(contacts_of(rows, *i, s.tag));
-    const int body = s.stored ? solid_.store().find(s.tag)->body : interface_[k].state.body;
+    const int body = s.stored ? bed_.solid.store().find(s.tag)->body : interface_[k].state.body;
     give(*i, contacts_in_body(s.tag, s.stored, body));
   }
 }
 
 void ShownBed::take_contacts() {
-  if (!shown_ || solid_.contacts().width() == 0) return;
+  if (!shown_ || bed_.solid.contacts().width() == 0) return;
   AtomIndex atoms;
-  atoms.index(ports_.atoms);
+  atoms.index(bed_.atoms);
   for (const Shown& s : granules_)
-    if (const int* i = atoms.find(s.tag)) ports_.contacts.clear_histories(*i);
+    if (const int* i = atoms.find(s.tag)) bed_.contacts.clear_histories(*i);
   for (const KnownContacts& c : outer_)
     if (const int* i = atoms.find(c.tag)) give(*i, c);
   outer_.clear();
@@ -159,7 +159,7 @@ void ShownBed::take_contacts() {
 // ------------------------------------------------------------------------------------------------------------ back
 
 void ShownBed::hide() {
-  Atoms& atoms = ports_.atoms;
+  Atoms& atoms = bed_.atoms;
   changes_.clear();
   asking_.clear();
   groups_of_guests_ = 0;
@@ -173,8 +173,8 @@ void ShownBed::hide() {
   std::sort(guests.rbegin(), guests.rend());
   for (const int i : guests) atoms.take_out(i);
 
-  changed_ = ports_.ranks.any(!changes_.empty());
-  wake_.ask_many(ports_.ranks, asking_, scales_.wake_up(), solid_.locked());
+  changed_ = bed_.ranks.any(!changes_.empty());
+  wake_.ask_many(bed_.ranks, asking_, bed_.scales.wake_up(), bed_.solid.locked());
   shown_ = false;
   if (granules_.capacity() < worth_freeing) return;
   names_ = {};
@@ -185,42 +185,42 @@ void ShownBed::hide() {
 
 /// A command may have sent granules to other ranks; they go back to where their bodies are.
 void ShownBed::bring_strangers_home(std::vector<int>& at) {
-  Atoms& atoms = ports_.atoms;
+  Atoms& atoms = bed_.atoms;
   std::vector<double> mine, record;
   for (int i = atoms.owned - 1; i >= 0; --i) {
     const Name& name = names_[static_cast<std::size_t>(i)];
-    if (name.home == nobody || name.home == ports_.ranks.me) continue;
+    if (name.home == nobody || name.home == bed_.ranks.me) continue;
     int layout = 0;
     atoms.pack(i, record, layout);
     const std::string text = atoms.layout_text(layout);
     mine.insert(mine.end(), {double(name.home), double(name.number), double(text.size()), double(record.size())});
     mine.insert(mine.end(), text.begin(), text.end());
     mine.insert(mine.end(), record.begin(), record.end());
-    shell_.reset(i);
+    bed_.shell.reset(i);
     atoms.take_out(i);
   }
-  if (ports_.ranks.any(!mine.empty())) {
-    const std::vector<double> all = ports_.ranks.gather(mine);
+  if (bed_.ranks.any(!mine.empty())) {
+    const std::vector<double> all = bed_.ranks.gather(mine);
     for (const double* row = all.data(); row != all.data() + all.size();) {
       const int home = static_cast<int>(row[0]), number = static_cast<int>(row[1]);
       const double *const text = row + 4, *const numbers = text + static_cast<std::size_t>(row[2]);
       row = numbers + static_cast<std::size_t>(row[3]);
-      if (home != ports_.ranks.me) continue;
+      if (home != bed_.ranks.me) continue;
       record.assign(numbers, row);
       const int i = atoms.put_back(record, atoms.layout_from_text(std::string(text, numbers)));
       names_[static_cast<std::size_t>(i)] = {home, number};
       Shown& s = granules_[static_cast<std::size_t>(number)];
       s.has_been_away = true;
-      if (!s.stored) shell_.put(i, interface_[static_cast<std::size_t>(number)].state);
+      if (!s.stored) bed_.shell.put(i, interface_[static_cast<std::size_t>(number)].state);
     }
   }
   for (int i = 0; i < atoms.owned; ++i)
-    if (const Name& name = names_[static_cast<std::size_t>(i)]; name.home == ports_.ranks.me)
+    if (const Name& name = names_[static_cast<std::size_t>(i)]; name.home == bed_.ranks.me)
       at[static_cast<std::size_t>(name.number)] = i;
 }
 
 bool ShownBed::is_as_shown(const Shown& s, int i) const {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   return atoms.place(i) == s.place && atoms.velocity(i) == s.velocity && atoms.spin(i) == s.spin && atoms.radius[i] == s.radius &&
          atoms.mass[i] == s.mass && atoms.type[i] == s.type;
 }
@@ -228,7 +228,7 @@ bool ShownBed::is_as_shown(const Shown& s, int i) const {
 /// What became of a granule, which is atom i.
 void ShownBed::judge(std::size_t number, int i) {
   const Shown& s = granules_[number];
-  Atoms& atoms = ports_.atoms;
+  Atoms& atoms = bed_.atoms;
   const auto wakes = [&] { asking_.push_back(s.place); };
   if (i == gone) {
     wakes();
@@ -250,7 +250,7 @@ void ShownBed::judge(std::size_t number, int i) {
     if (changed)
       changes_[s.tag] = {false, atoms.place(i) != s.place, layout, record_};
     else if (sum_of(record_) != s.sum)
-      solid_.set_record(s.tag, layout, record_, motion_words_);
+      bed_.solid.set_record(s.tag, layout, record_, motion_words_);
   }
   if (s.stored) return;
   // until it wakes, or goes on in its body, it is as it was
@@ -263,39 +263,39 @@ void ShownBed::judge(std::size_t number, int i) {
 void ShownBed::give_changes() {
   if (!changed_) return;
   changed_ = false;
-  index_.index(ports_.atoms);
+  bed_.index.index(bed_.atoms);
   for (const auto& [tag, change] : changes_)
-    if (const int* i = index_.find(tag)) {  // an interface granule that was deleted is no atom any more
+    if (const int* i = bed_.index.find(tag)) {  // an interface granule that was deleted is no atom any more
       give(*i, change);
     } else if (!change.deleted) {
       throw InternalError("granule " + std::to_string(tag) + " was changed and did not wake");
     }
   changes_.clear();
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   bool far = false;
-  for (int i = 0; i < atoms.owned && !far && ports_.ranks.count > 1; ++i) far = !ports_.ranks.owns(atoms.place(i));
-  ports_.atoms.publish_counts(0);
-  if (ports_.ranks.any(far)) ports_.atoms.send_far();
+  for (int i = 0; i < atoms.owned && !far && bed_.ranks.count > 1; ++i) far = !bed_.ranks.owns(atoms.place(i));
+  bed_.atoms.publish_counts(0);
+  if (bed_.ranks.any(far)) bed_.atoms.send_far();
 }
 
 /// It keeps its contacts.
 void ShownBed::give(int i, const Change& change) {
-  Atoms& atoms = ports_.atoms;
+  Atoms& atoms = bed_.atoms;
   const std::int64_t tag = atoms.tag[i];
-  const KnownContacts contacts = contacts_of(ports_.contacts.histories(), i, tag);
-  ports_.contacts.clear_histories(i);
-  shell_.reset(i);
+  const KnownContacts contacts = contacts_of(bed_.contacts.histories(), i, tag);
+  bed_.contacts.clear_histories(i);
+  bed_.shell.reset(i);
   const Vec3 place = atoms.place(i);
   atoms.take_out(i);
-  index_.erase(tag);
-  if (i < atoms.owned) index_.set(atoms.tag[i], i);
+  bed_.index.erase(tag);
+  if (i < atoms.owned) bed_.index.set(atoms.tag[i], i);
   if (change.deleted) return;
   const int now = atoms.put_back(change.record, change.layout);
-  if (scales_.refills() && !change.moved) atoms.set_place(now, place);  // as it was packed when it woke
+  if (bed_.scales.refills() && !change.moved) atoms.set_place(now, place);  // as it was packed when it woke
   atoms.mark_interface(now, false);
-  ports_.contacts.clear_histories(now);
+  bed_.contacts.clear_histories(now);
   give(now, contacts);
-  index_.set(tag, now);
+  bed_.index.set(tag, now);
 }
 
 // ------------------------------------------------------------------------------------------------------------ by atom

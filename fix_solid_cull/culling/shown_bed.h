@@ -5,13 +5,8 @@
 #include <map>
 #include <vector>
 
-#include "atom_index.h"
-#include "body_groups.h"
-#include "granule_masses.h"
+#include "bed.h"
 #include "per_granule.h"
-#include "ports.h"
-#include "shell.h"
-#include "solid.h"
 #include "wake_requests.h"
 
 namespace solidcull {
@@ -20,16 +15,14 @@ namespace solidcull {
 /// back at once. What it changed wakes with all that is near, and then has the state that the deck gave it.
 class ShownBed : public FollowsAtoms {
  public:
-  ShownBed(const Ports& ports, const Scales& scales, Solid& solid, Shell& shell, AtomIndex& index, const BodyGroups& groups,
-           WakeRequests& wake)
-      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), index_(index), groups_(groups), wake_(wake) {}
+  ShownBed(Bed& bed, WakeRequests& wake) : bed_(bed), wake_(wake) {}
 
   bool shown() const { return shown_; }
   /// Whether owned atom i is a stored granule that is shown. Local.
   bool is_guest(int i) const {
     if (!shown_) return false;
     const Name& name = names_[static_cast<std::size_t>(i)];
-    return name.home != nobody && (name.home != ports_.ranks.me || granules_[static_cast<std::size_t>(name.number)].stored);
+    return name.home != nobody && (name.home != bed_.ranks.me || granules_[static_cast<std::size_t>(name.number)].stored);
   }
   /// Contact histories are up to date, and there are no ghosts. Local.
   void show();
@@ -98,12 +91,7 @@ class ShownBed : public FollowsAtoms {
   void judge(std::size_t number, int i);
   void give(int i, const Change& change);
 
-  const Ports& ports_;
-  const Scales& scales_;
-  Solid& solid_;
-  Shell& shell_;
-  AtomIndex& index_;
-  const BodyGroups& groups_;
+  Bed& bed_;
   WakeRequests& wake_;
 
   bool shown_ = false, changed_ = false;

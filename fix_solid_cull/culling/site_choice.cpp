@@ -27,28 +27,25 @@ double square_of_overlap(const Sphere& a, const Sphere& b, const Vec3& apart) {
 
 }  // namespace
 
-SiteChoice::SiteChoice(const Ports& ports, const Scales& scales, const Solid& solid, const Shell& shell,
-                       const std::vector<int>& going, double wall_gap, Clear clear)
-    : scales_(scales),
-      solid_(solid),
-      shell_(shell),
+SiteChoice::SiteChoice(const Bed& bed, const std::vector<int>& going, double wall_gap, Clear clear)
+    : bed_(bed),
       going_(going),
       wall_gap_(wall_gap),
       clear_(std::move(clear)),
-      spheres_(spheres_of(ports.atoms, going)),
-      walls_(ports.walls, spheres_, longest_way(spheres_, scales) + wall_gap) {
-  std::vector<char> goes(static_cast<std::size_t>(ports.atoms.owned), 0);
+      spheres_(spheres_of(bed.atoms, going)),
+      walls_(bed.walls, spheres_, longest_way(spheres_, bed.scales) + wall_gap) {
+  std::vector<char> goes(static_cast<std::size_t>(bed.atoms.owned), 0);
   for (const int i : going) goes[static_cast<std::size_t>(i)] = 1;
   std::vector<Sphere> staying;
-  for (int i = 0; i < ports.atoms.owned; ++i)
-    if (shell[i].locked && !goes[static_cast<std::size_t>(i)]) staying.push_back(ports.atoms.sphere(i));
-  staying_.build(std::move(staying), 2 * scales.diameter());
+  for (int i = 0; i < bed.atoms.owned; ++i)
+    if (bed.shell[i].locked && !goes[static_cast<std::size_t>(i)]) staying.push_back(bed.atoms.sphere(i));
+  staying_.build(std::move(staying), 2 * bed.scales.diameter());
 }
 
 /// Sum of their squares, as shares of the radii's sums.
 double SiteChoice::overlaps(const Sphere& there, const Sphere& in_frame, int frame) const {
   double sum = 0;
-  solid_.store().for_each_near(frame, in_frame, 0, [&](const Resident& g) {
+  bed_.solid.store().for_each_near(frame, in_frame, 0, [&](const Resident& g) {
     sum += square_of_overlap(in_frame, {g.position, g.radius}, g.position - in_frame.centre);
   });
   const Vec3 reach = Vec3::Constant(there.radius + staying_.largest_radius());
@@ -61,16 +58,16 @@ double SiteChoice::overlaps(const Sphere& there, const Sphere& in_frame, int fra
 
 std::optional<Vec3> SiteChoice::of(std::size_t k) const {
   const int i = going_[k];
-  const Locked& e = shell_[i];
+  const Locked& e = bed_.shell[i];
   const Sphere& from = spheres_[k];
-  const GranuleStore& store = solid_.store();
-  const Pose& pose = solid_.bodies().pose(e.body);
+  const GranuleStore& store = bed_.solid.store();
+  const Pose& pose = bed_.solid.bodies().pose(e.body);
   std::optional<Vec3> best;
   double least = HUGE_VAL;
   store.free_site(e.body, e.place, from.radius, search, [&](const Vec3& site) {
     const Vec3 by = pose.turned_to_world(site - e.place);
     const Sphere there{from.centre + by, from.radius};
-    const double way = by.norm() / scales_.diameter();
+    const double way = by.norm() / bed_.scales.diameter();
     double cost = weight_of_way * way * way;
     if (cost >= least) return false;
     cost += overlaps(there, {site, from.radius}, store.frame_of(e.body));

@@ -5,11 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "bed.h"
 #include "near_walls.h"
-#include "ports.h"
-#include "scales.h"
-#include "shell.h"
-#include "solid.h"
 #include "sphere_cells.h"
 
 namespace solidcull {
@@ -22,17 +19,14 @@ class SiteChoice {
   using Clear = std::function<bool(int atom, const Sphere& there)>;
 
   /// going: atoms that are to go, `wall_gap`: how far from walls they must be (m).
-  SiteChoice(const Ports& ports, const Scales& scales, const Solid& solid, const Shell& shell, const std::vector<int>& going,
-             double wall_gap, Clear clear);
+  SiteChoice(const Bed& bed, const std::vector<int>& going, double wall_gap, Clear clear);
   /// In the frame of its body, for going[k], which is an atom still; nothing if no site will do.
   std::optional<Vec3> of(std::size_t k) const;
 
  private:
   double overlaps(const Sphere& there, const Sphere& in_frame, int frame) const;
 
-  const Scales& scales_;
-  const Solid& solid_;
-  const Shell& shell_;
+  const Bed& bed_;
   const std::vector<int> going_;
   const double wall_gap_;
   const Clear clear_;

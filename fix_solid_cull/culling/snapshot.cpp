@@ -55,32 +55,32 @@ constexpr const char* damaged = "the restart file is damaged where it holds this
 // ------------------------------------------------------------------------------------------------------------ out
 
 std::vector<double> Snapshot::write() {
-  index_.index(ports_.atoms);
-  const bool store = solid_.has_store();
-  Ledger::Counters sums = solid_.ledger().counters();
+  bed_.index.index(bed_.atoms);
+  const bool store = bed_.solid.has_store();
+  Ledger::Counters sums = bed_.solid.ledger().counters();
   const double carves = sums[Ledger::carves_counter];
-  ports_.ranks.sum(sums.data(), Ledger::counters_size);
+  bed_.ranks.sum(sums.data(), Ledger::counters_size);
   sums[Ledger::carves_counter] = carves;
-  std::int64_t stored = store ? static_cast<std::int64_t>(solid_.store().size()) : 0;
-  ports_.ranks.sum(&stored, 1);
-  std::vector<double> radii = solid_.largest_radius_by_type();
-  ports_.ranks.largest(radii.data(), static_cast<int>(radii.size()));
-  identity_ = store ? ChunkSource::identity(ports_, solid_, shell_) : 0;
-  if (ports_.ranks.me != 0) return {};
+  std::int64_t stored = store ? static_cast<std::int64_t>(bed_.solid.store().size()) : 0;
+  bed_.ranks.sum(&stored, 1);
+  std::vector<double> radii = bed_.solid.largest_radius_by_type();
+  bed_.ranks.largest(radii.data(), static_cast<int>(radii.size()));
+  identity_ = store ? ChunkSource::identity(bed_) : 0;
+  if (bed_.ranks.me != 0) return {};
   std::vector<double> state(1 + header_size);
   state[0] = static_cast<double>(state.size() + radii.size() + check_sum_size);
   double* const h = &state[1];
   h[mark] = file_mark;
   h[size_again] = state[0];
   h[interior] = static_cast<double>(stored);
-  h[diameter] = scales_.diameter();
-  h[gravity] = scales_.gravity();
+  h[diameter] = bed_.scales.diameter();
+  h[gravity] = bed_.scales.gravity();
   set(h + gravity_x, gravity_.at_last_look());
   std::copy(sums.begin(), sums.end(), h + counters);
-  h[width] = static_cast<double>(solid_.contacts().width());
-  h[ranks] = ports_.ranks.count;
-  h[step] = static_cast<double>(ports_.run.step);
-  h[no_places] = scales_.refills();
+  h[width] = static_cast<double>(bed_.solid.contacts().width());
+  h[ranks] = bed_.ranks.count;
+  h[step] = static_cast<double>(bed_.run.step);
+  h[no_places] = bed_.scales.refills();
   h[has_section] = store;
   const auto name = halves(identity_);
   std::copy(name.begin(), name.end(), h + identity_high);
@@ -92,19 +92,19 @@ std::vector<double> Snapshot::write() {
 }
 
 void Snapshot::append_to(const std::string& file) {
-  if (!solid_.has_store()) return;
-  SectionWriter out(ports_.ranks, file, identity_);
+  if (!bed_.solid.has_store()) return;
+  SectionWriter out(bed_.ranks, file, identity_);
   std::int64_t counts[3] = {0, 0, 0};
-  for (int rank = 0; rank < ports_.ranks.count; ++rank) {
-    const bool mine = rank == ports_.ranks.me;
-    ChunkSource source(ports_, solid_, shell_, index_, cover_);
-    for (SectionChunk chunk; ports_.ranks.any(mine && source.next(chunk)); chunk.bytes.clear()) out.put(chunk);
+  for (int rank = 0; rank < bed_.ranks.count; ++rank) {
+    const bool mine = rank == bed_.ranks.me;
+    ChunkSource source(bed_, cover_);
+    for (SectionChunk chunk; bed_.ranks.any(mine && source.next(chunk)); chunk.bytes.clear()) out.put(chunk);
     if (!mine) continue;
     counts[0] = static_cast<std::int64_t>(source.interior());
     counts[1] = static_cast<std::int64_t>(source.interface_granules());
     counts[2] = static_cast<std::int64_t>(source.contacts());
   }
-  ports_.ranks.sum(counts, 3);
+  bed_.ranks.sum(counts, 3);
   SectionCounts whole;
   whole.interior = static_cast<std::uint64_t>(counts[0]);
   whole.interface_granules = static_cast<std::uint64_t>(counts[1]);
@@ -138,72 +138,72 @@ void Snapshot::read(const std::vector<double>& state, const std::string& file) {
   file_ = file;
   const double* const h = state_.data();
   if (h[has_section] != 0) {
-    const SectionReader section(ports_.ranks, file_, joined(h + identity_high));
+    const SectionReader section(bed_.ranks, file_, joined(h + identity_high));
     if (section.counts().interior != static_cast<std::uint64_t>(h[interior])) throw InputError(damaged);
   }
-  scales_.set(h[diameter], h[gravity]);
+  bed_.scales.set(h[diameter], h[gravity]);
   gravity_.set_at_last_look(vec(h + gravity_x));
   const std::int64_t then = static_cast<std::int64_t>(h[step]);
-  ports_.run.reset_by += ports_.run.step - then;
-  ports_.run.step = then;
+  bed_.run.reset_by += bed_.run.step - then;
+  bed_.run.step = then;
   Ledger::Counters counted{};
   for (int k = 0; k < Ledger::counters_size; ++k)
-    if (ports_.ranks.me == 0 || k == Ledger::carves_counter) counted[k] = h[counters + k];
-  solid_.set_counters(counted);
+    if (bed_.ranks.me == 0 || k == Ledger::carves_counter) counted[k] = h[counters + k];
+  bed_.solid.set_counters(counted);
 
   // the neighbour cut-off is set before the store is taken up: it must know the largest stored radius
   const int known =
-      static_cast<int>(std::min<std::size_t>(solid_.largest_radius_by_type().size(), static_cast<std::size_t>(h[types])));
-  for (int type = 1; type < known; ++type) solid_.know_radius(type, h[header_size + type]);
+      static_cast<int>(std::min<std::size_t>(bed_.solid.largest_radius_by_type().size(), static_cast<std::size_t>(h[types])));
+  for (int type = 1; type < known; ++type) bed_.solid.know_radius(type, h[header_size + type]);
 }
 
 void Snapshot::take_up() {
   const std::vector<double> state = std::move(state_);
   state_.clear();
   const double* const h = state.data();
-  if (static_cast<std::size_t>(h[width]) != solid_.contacts().width())
+  if (static_cast<std::size_t>(h[width]) != bed_.solid.contacts().width())
     throw InputError("the restart file holds contact histories of " + std::to_string(static_cast<int>(h[width])) +
-                     " numbers and this deck's contact model has " + std::to_string(solid_.contacts().width()) +
+                     " numbers and this deck's contact model has " + std::to_string(bed_.solid.contacts().width()) +
                      ": use the contact model that the file was written with");
-  if ((h[no_places] != 0) != scales_.refills() && h[interior] > 0)
+  if ((h[no_places] != 0) != bed_.scales.refills() && h[interior] > 0)
     throw InputError(std::string("the restart file was written with 'store ") +
-                     (scales_.refills() ? "exact' or 'compact" : "none") + "': read it with that store");
+                     (bed_.scales.refills() ? "exact' or 'compact" : "none") + "': read it with that store");
   if (h[has_section] == 0) return;
   const std::uint64_t identity = joined(h + identity_high);
-  index_.index(ports_.atoms);
-  take(identity, static_cast<int>(h[ranks]) == ports_.ranks.count && stands_as_it_was(identity));
+  bed_.index.index(bed_.atoms);
+  take(identity, static_cast<int>(h[ranks]) == bed_.ranks.count && stands_as_it_was(identity));
 }
 
 /// Whether this rank holds what is in the parcel.
 bool Snapshot::holds(const Parcel& p) const {
   return std::all_of(p.granules.begin(), p.granules.end(), [&](const Parcel::Granule& g) {
-    return g.record ? ports_.ranks.owns(p.sender->bodies.at(static_cast<std::size_t>(g.body)).pose.to_world(g.place))
-                    : index_.contains(g.tag);
+    return g.record ? bed_.ranks.owns(p.sender->bodies.at(static_cast<std::size_t>(g.body)).pose.to_world(g.place))
+                    : bed_.index.contains(g.tag);
   });
 }
 
 /// Whether each rank holds all that it wrote, and locked atoms that it wrote only.
 bool Snapshot::stands_as_it_was(std::uint64_t identity) const {
   std::int64_t locked = 0;
-  for (int i = 0; i < ports_.atoms.owned; ++i) locked += shell_[i].locked;
+  for (int i = 0; i < bed_.atoms.owned; ++i) locked += bed_.shell[i].locked;
   bool same = true, moved = false;  // moved: the borders of the subdomain
-  SectionReader section(ports_.ranks, file_, identity);
-  ChunkReader reader(ports_, scales_, solid_.contacts().width());
-  const auto mine = [&](const SectionChunk& c) { return c.rank == static_cast<std::uint64_t>(ports_.ranks.me); };
+  SectionReader section(bed_.ranks, file_, identity);
+  ChunkReader reader(bed_);
+  const auto mine = [&](const SectionChunk& c) { return c.rank == static_cast<std::uint64_t>(bed_.ranks.me); };
   SectionChunk chunk;
   while (section.next(chunk, [](const SectionChunk& c) { return c.kind != SectionChunk::interior_granules; })) {
     if (!mine(chunk) || chunk.kind == SectionChunk::interior_granules) continue;
     if (chunk.kind == SectionChunk::part) {
       const Box& then = reader.part(chunk).own;
-      moved = moved || then.lo != ports_.run.own.lo || then.hi != ports_.run.own.hi;
+      moved = moved || then.lo != bed_.run.own.lo || then.hi != bed_.run.own.hi;
     } else {
       locked -= static_cast<std::int64_t>(chunk.granules);
       same = same && holds(reader.parcel(chunk));
     }
   }
-  if (ports_.ranks.any(!same || locked != 0)) return false;
-  if (ports_.ranks.count == 1 || !ports_.ranks.any(moved)) return true;
-  SectionReader again(ports_.ranks, file_, identity);
+  if (bed_.ranks.any(!same || locked != 0)) return false;
+  if (bed_.ranks.count == 1 || !bed_.ranks.any(moved)) return true;
+  SectionReader again(bed_.ranks, file_, identity);
   while (again.next(chunk)) {
     if (!mine(chunk)) continue;
     if (chunk.kind == SectionChunk::part)
@@ -211,19 +211,19 @@ bool Snapshot::stands_as_it_was(std::uint64_t identity) const {
     else
       same = same && holds(reader.parcel(chunk));
   }
-  return !ports_.ranks.any(!same);
+  return !bed_.ranks.any(!same);
 }
 
 void Snapshot::take(std::uint64_t identity, bool as_it_was) {
-  SectionReader section(ports_.ranks, file_, identity);
-  ChunkReader reader(ports_, scales_, solid_.contacts().width());
+  SectionReader section(bed_.ranks, file_, identity);
+  ChunkReader reader(bed_);
   SectionCounts read;
   if (!as_it_was) parcels_.begin_taking();
   for (SectionChunk chunk; section.next(chunk);) {
     ++read.chunks;
     if (chunk.kind == SectionChunk::interior_granules) read.interior += chunk.granules;
     if (chunk.kind == SectionChunk::interface_granules) read.interface_granules += chunk.granules;
-    if (as_it_was && chunk.rank != static_cast<std::uint64_t>(ports_.ranks.me)) continue;
+    if (as_it_was && chunk.rank != static_cast<std::uint64_t>(bed_.ranks.me)) continue;
     if (chunk.kind == SectionChunk::part) {
       const ChunkReader::Head& head = reader.part(chunk);
       if (as_it_was) parcels_.begin_as_it_was(*head.sender);
@@ -237,8 +237,8 @@ void Snapshot::take(std::uint64_t identity, bool as_it_was) {
   if (read.chunks != due.chunks || read.interior != due.interior || read.interface_granules != due.interface_granules)
     throw InputError(damaged);
   as_it_was ? parcels_.end_as_it_was() : parcels_.end_taking();
-  std::int64_t stored = static_cast<std::int64_t>(solid_.store().size());
-  ports_.ranks.sum(&stored, 1);
+  std::int64_t stored = static_cast<std::int64_t>(bed_.solid.store().size());
+  bed_.ranks.sum(&stored, 1);
   if (stored != static_cast<std::int64_t>(due.interior))
     throw InternalError("of " + std::to_string(due.interior) + " interior granules of the restart file " +
                         std::to_string(stored) + " were taken up");

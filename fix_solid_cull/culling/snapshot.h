@@ -5,28 +5,18 @@
 #include <string>
 #include <vector>
 
+#include "bed.h"
 #include "effective_gravity.h"
 #include "parcels.h"
-#include "ports.h"
-#include "scales.h"
 #include "section_chunks.h"
-#include "solid.h"
 #include "store_section.h"
 
 namespace solidcull {
 
 class Snapshot {
  public:
-  Snapshot(const Ports& ports, Scales& scales, Solid& solid, const Shell& shell, AtomIndex& index, Parcels& parcels,
-           EffectiveGravity& gravity, const Cover& cover)
-      : ports_(ports),
-        scales_(scales),
-        solid_(solid),
-        shell_(shell),
-        index_(index),
-        parcels_(parcels),
-        gravity_(gravity),
-        cover_(cover) {}
+  Snapshot(Bed& bed, Parcels& parcels, EffectiveGravity& gravity, const Cover& cover)
+      : bed_(bed), parcels_(parcels), gravity_(gravity), cover_(cover) {}
 
   /// On rank 0 the numbers for the file's head, the first of them how many they are; empty elsewhere. Collective.
   std::vector<double> write();
@@ -50,11 +40,7 @@ class Snapshot {
   bool holds(const Parcel& parcel) const;
   void take(std::uint64_t identity, bool as_it_was);
 
-  const Ports& ports_;
-  Scales& scales_;
-  Solid& solid_;
-  const Shell& shell_;
-  AtomIndex& index_;
+  Bed& bed_;
   Parcels& parcels_;
   EffectiveGravity& gravity_;
   const Cover& cover_;

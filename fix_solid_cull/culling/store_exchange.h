@@ -5,12 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "atom_index.h"
+#include "bed.h"
 #include "cover.h"
 #include "grounding.h"
-#include "ports.h"
-#include "shell.h"
-#include "solid.h"
 #include "wall_survey.h"
 
 namespace solidcull {
@@ -18,16 +15,8 @@ namespace solidcull {
 /// Only while membership changes: atoms take other indices, which the index of tags follows. Local.
 class StoreExchange {
  public:
-  StoreExchange(const Ports& ports, const Scales& scales, Solid& solid, Shell& shell, AtomIndex& index, WallSurvey& walls,
-                Cover& cover, const Grounding& grounding)
-      : ports_(ports),
-        scales_(scales),
-        solid_(solid),
-        shell_(shell),
-        index_(index),
-        walls_(walls),
-        cover_(cover),
-        grounding_(grounding) {}
+  StoreExchange(Bed& bed, WallSurvey& walls, Cover& cover, const Grounding& grounding)
+      : bed_(bed), walls_(walls), cover_(cover), grounding_(grounding) {}
 
   /// Interface granule i goes to the store; the last owned atom takes its index.
   void put_away(int i);
@@ -52,11 +41,7 @@ class StoreExchange {
  private:
   static constexpr std::int64_t never = -1;
 
-  const Ports& ports_;
-  const Scales& scales_;
-  Solid& solid_;
-  Shell& shell_;
-  AtomIndex& index_;
+  Bed& bed_;
   WallSurvey& walls_;
   Cover& cover_;
   const Grounding& grounding_;

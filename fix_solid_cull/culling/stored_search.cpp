@@ -4,12 +4,12 @@
 
 namespace solidcull {
 
-double contact_reach(const Ports& ports, const Solid& solid) {
+double contact_reach(const BedState& bed) {
   double largest = 0;
-  for (int i = 0; i < ports.atoms.owned; ++i) largest = std::max(largest, ports.atoms.radius[i]);
-  if (solid.has_store()) largest = std::max(largest, solid.store().largest_radius());
-  ports.ranks.largest(&largest, 1);
-  return 2 * largest + ports.run.skin;
+  for (int i = 0; i < bed.atoms.owned; ++i) largest = std::max(largest, bed.atoms.radius[i]);
+  if (bed.solid.has_store()) largest = std::max(largest, bed.solid.store().largest_radius());
+  bed.ranks.largest(&largest, 1);
+  return 2 * largest + bed.run.skin;
 }
 
 }  // namespace solidcull

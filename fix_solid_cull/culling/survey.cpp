@@ -27,38 +27,38 @@ FlatMap<char> set_of(const std::vector<std::int64_t>& tags) {
 
 std::int64_t Survey::exterior_here() const {
   std::int64_t n = 0;
-  for (int i = 0; i < ports_.atoms.owned; ++i) n += !shell_[i].locked;
+  for (int i = 0; i < bed_.atoms.owned; ++i) n += !bed_.shell[i].locked;
   return n;
 }
 
 double Survey::kinetic_energy_of_exterior() const {
   double energy = 0;
-  for (int i = 0; i < ports_.atoms.owned; ++i)
-    if (!shell_[i].locked) energy += 0.5 * ports_.atoms.mass[i] * ports_.atoms.velocity(i).squaredNorm();
-  ports_.ranks.sum(&energy, 1);
+  for (int i = 0; i < bed_.atoms.owned; ++i)
+    if (!bed_.shell[i].locked) energy += 0.5 * bed_.atoms.mass[i] * bed_.atoms.velocity(i).squaredNorm();
+  bed_.ranks.sum(&energy, 1);
   return energy;
 }
 
 void Survey::forget_calm() {
-  for (int i = 0; i < ports_.atoms.owned; ++i)
-    if (!shell_[i].locked) rows_[i].calm = 0;
+  for (int i = 0; i < bed_.atoms.owned; ++i)
+    if (!bed_.shell[i].locked) rows_[i].calm = 0;
 }
 
 // ------------------------------------------------------------------------------------------------------------ solid state
 
 /// Of owned granules and ghosts (m/s^2).
 std::vector<Vec3> Survey::accelerations() const {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   std::vector<Vec3> a(static_cast<std::size_t>(atoms.owned + atoms.ghosts), Vec3::Zero());
   for (int i = 0; i < atoms.owned; ++i)
-    if (!shell_[i].locked) a[i] = atoms.force(i) / atoms.mass[i];
-  if (scales_.rigid())
+    if (!bed_.shell[i].locked) a[i] = atoms.force(i) / atoms.mass[i];
+  if (bed_.scales.rigid())
     for (std::size_t k = 0; k < motion_.interface_atoms().size(); ++k) {
       const ActiveBody& b = motion_.active()[motion_.slot(k)];
       const int i = motion_.interface_atoms()[k];
-      if (!b.stands) a[i] = b.body->motion.acceleration(b.body->pose.to_world(shell_[i].place), b.force, b.torque);
+      if (!b.stands) a[i] = b.body->motion.acceleration(b.body->pose.to_world(bed_.shell[i].place), b.force, b.torque);
     }
-  if (!ports_.ranks.has_neighbours()) return a;
+  if (!bed_.ranks.has_neighbours()) return a;
   struct Row {
     Triple at;
     std::int64_t tag;
@@ -66,7 +66,7 @@ std::vector<Vec3> Survey::accelerations() const {
   };
   std::vector<Row> rows;
   for (int i = 0; i < atoms.owned; ++i) rows.push_back({triple(atoms.place(i)), atoms.tag[i], triple(a[i])});
-  rows = ports_.ranks.exchange(rows, contact_reach(ports_, solid_));
+  rows = bed_.ranks.exchange(rows, contact_reach(bed_));
   FlatMap<std::size_t> row_of;
   for (std::size_t r = 0; r < rows.size(); ++r) row_of[rows[r].tag] = r;
   for (int i = atoms.owned; i < atoms.owned + atoms.ghosts; ++i)
@@ -95,12 +95,12 @@ struct Survey::Seen {
 };
 
 Survey::Seen Survey::see_contacts(const SolidStateLaw& law) const {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   const int owned = atoms.owned;
   Seen seen(static_cast<std::size_t>(owned));
   seen.acceleration = accelerations();
-  const double bears = ports_.contacts.reach_factor;
-  const NeighbourRows list = ports_.contacts.neighbours();
+  const double bears = bed_.contacts.reach_factor;
+  const NeighbourRows list = bed_.contacts.neighbours();
   for (int row = 0; row < list.rows; ++row) {
     const int i = list.row[row];
     if (i >= owned) continue;
@@ -126,14 +126,14 @@ Survey::Seen Survey::see_contacts(const SolidStateLaw& law) const {
       };
       note(i, j);
       if (j < owned) note(j, i);
-      if (shell_[i].locked && groups_.key_of_atom(j)) seen.between_bodies.push_back({i, j});
+      if (bed_.shell[i].locked && bed_.groups.key_of_atom(j)) seen.between_bodies.push_back({i, j});
     }
   }
   return seen;
 }
 
 bool Survey::is_solid(int i, const Seen& seen, const SolidStateLaw& law) {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   const AtWall& wall = walls_[i];
   const bool at_wall = wall.touched > 0, loaded = seen.loaded[i] || at_wall;
   const Vec3 v = atoms.velocity(i);
@@ -142,30 +142,31 @@ bool Survey::is_solid(int i, const Seen& seen, const SolidStateLaw& law) {
   if (!(seen.touching[i] || at_wall) || seen.moving[i] || leaves_wall || !(loaded || !seen.drifting[i]) ||
       !atoms.may_be_culled(i))
     return false;
-  if (!scales_.rigid()) return law.at_rest(v, atoms.spin(i), atoms.radius[i]) && law.balanced(seen.acceleration[i], Vec3::Zero());
+  if (!bed_.scales.rigid())
+    return law.at_rest(v, atoms.spin(i), atoms.radius[i]) && law.balanced(seen.acceleration[i], Vec3::Zero());
   // a wall is a neighbour too; that it is accelerated itself is not known here
   const double all = seen.mass[i] + (at_wall ? atoms.mass[i] : 0.0);
   const Vec3 frame = seen.around[i] / all;
   if (!law.balanced(seen.acceleration[i], frame)) return false;
   AtRest& r = rows_[i];
-  const double passed = static_cast<double>(ports_.run.step - r.since) * ports_.run.dt;
+  const double passed = static_cast<double>(bed_.run.step - r.since) * bed_.run.dt;
   if (r.calm == 0 || !law.went_on(v - r.velocity, r.acceleration_around, frame, passed)) {
     r.calm = 0;  // calm begins here, with this motion
     r.velocity = v;
     r.acceleration_around = frame;
-    r.since = ports_.run.step;
+    r.since = bed_.run.step;
   }
   return true;
 }
 
 std::int64_t Survey::find_calm(const Patience& patience, Proposal& proposal) {
-  SolidStateLaw law = scales_.solid_state();
+  SolidStateLaw law = bed_.scales.solid_state();
   law.speed /= patience.speed_divisor;
   law.force /= patience.force_divisor;
   const Seen seen = see_contacts(law);
   std::int64_t candidates = 0;
-  for (int i = 0; i < ports_.atoms.owned; ++i) {
-    if (shell_[i].locked) continue;
+  for (int i = 0; i < bed_.atoms.owned; ++i) {
+    if (bed_.shell[i].locked) continue;
     const bool solid = is_solid(i, seen, law);
     rows_[i].calm = solid ? rows_[i].calm + 1 : 0;
     candidates += rows_[i].calm >= looks_for(i, patience);
@@ -176,14 +177,14 @@ std::int64_t Survey::find_calm(const Patience& patience, Proposal& proposal) {
 
 /// Bodies that have rested against each other for so many looks are one.
 void Survey::join_bodies(const Seen& seen, int looks, Proposal& proposal) {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   const int owned = atoms.owned;
   std::vector<char> rests(static_cast<std::size_t>(owned), 0);  // against another body, once however many it touches
   for (const Pair& p : seen.between_bodies)
     for (const int end : {p.i, p.j})
       if (end < owned) rests[end] = !seen.moving[end];
   for (int i = 0; i < owned; ++i)
-    if (shell_[i].locked) rows_[i].calm = rests[i] ? rows_[i].calm + 1 : 0;
+    if (bed_.shell[i].locked) rows_[i].calm = rests[i] ? rows_[i].calm + 1 : 0;
   for (const Pair& p : seen.between_bodies) {
     const bool long_enough = rows_[p.i].calm >= looks && (p.j >= owned || rows_[p.j].calm >= looks);
     if (!long_enough || seen.moving[p.i] || (p.j < owned && seen.moving[p.j])) continue;
@@ -195,17 +196,17 @@ void Survey::join_bodies(const Seen& seen, int looks, Proposal& proposal) {
 
 /// Whether the loads on these owned granules are what they were at the last look.
 std::vector<char> Survey::find_steady(const std::vector<char>& asked) {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   const std::size_t owned = static_cast<std::size_t>(atoms.owned);
   std::vector<double> normal(owned, 0.0);
   std::vector<Vec3> pair_sum(owned, Vec3::Zero());
   if (std::find(asked.begin(), asked.end(), 1) != asked.end())
-    ports_.contacts.neighbours().for_each_pair(atoms.owned, [&](int i, int j, int k) {
+    bed_.contacts.neighbours().for_each_pair(atoms.owned, [&](int i, int j, int k) {
       const bool second = j < atoms.owned;
       if (!asked[i] && !(second && asked[j])) return;
       const Vec3 apart = atoms.place(i) - atoms.place(j);
-      if (apart.norm() > (atoms.radius[i] + atoms.radius[j]) * ports_.contacts.reach_factor) return;
-      const Vec3 f = ports_.contacts.force_on_first(i, k);
+      if (apart.norm() > (atoms.radius[i] + atoms.radius[j]) * bed_.contacts.reach_factor) return;
+      const Vec3 f = bed_.contacts.force_on_first(i, k);
       const double n = std::abs(f.dot(apart)) / apart.norm();
       normal[i] += n;
       pair_sum[i] += f;
@@ -214,9 +215,9 @@ std::vector<char> Survey::find_steady(const std::vector<char>& asked) {
       pair_sum[j] -= f;
     });
   std::vector<char> steady(owned, 0);
-  const Vec3 g = ports_.run.gravity();
+  const Vec3 g = bed_.run.gravity();
   for (int i = 0; i < atoms.owned; ++i) {
-    if (shell_[i].locked) continue;
+    if (bed_.shell[i].locked) continue;
     AtRest& r = rows_[i];
     if (!asked[i]) {
       r.normal_load = Locked::not_known;
@@ -225,8 +226,8 @@ std::vector<char> Survey::find_steady(const std::vector<char>& asked) {
     // what neither pairs nor weight explain is the walls'
     const Vec3 wall = atoms.force(i) - pair_sum[i] - atoms.mass[i] * g;
     const double load = normal[i] + (walls_[i].touched > 0 ? wall.norm() : 0.0), then = r.normal_load;
-    const double change = scales_.solid_state().force * atoms.mass[i] * scales_.gravity() +
-                          SolidStateLaw::out_of_balance_share * scales_.settings().tolerance_relative * load;
+    const double change = bed_.scales.solid_state().force * atoms.mass[i] * bed_.scales.gravity() +
+                          SolidStateLaw::out_of_balance_share * bed_.scales.settings().tolerance_relative * load;
     steady[i] = then != Locked::not_known && std::abs(load - then) <= change;
     r.normal_load = load;
   }
@@ -234,12 +235,12 @@ std::vector<char> Survey::find_steady(const std::vector<char>& asked) {
 }
 
 void Survey::leave_out_unsteady(const Patience& patience, Proposal& proposal) {
-  const bool live = scales_.needs_surface();
-  const Atoms& atoms = ports_.atoms;
+  const bool live = bed_.scales.needs_surface();
+  const Atoms& atoms = bed_.atoms;
   FlatMap<char> chosen = set_of(proposal.chosen);
   std::vector<char> asked(static_cast<std::size_t>(atoms.owned), 0);
   for (int i = 0; i < atoms.owned; ++i) {
-    const int calm = shell_[i].locked ? 0 : rows_[i].calm;
+    const int calm = bed_.shell[i].locked ? 0 : rows_[i].calm;
     const int from = std::max(1, looks_for(i, patience) - 1);
     asked[i] = live ? calm == from || chosen.contains(atoms.tag[i]) : calm >= from;
   }
@@ -257,13 +258,13 @@ void Survey::leave_out_unsteady(const Patience& patience, Proposal& proposal) {
 // ------------------------------------------------------------------------------------------------------------ choice
 
 void Survey::choose(int i, Proposal& proposal) {
-  proposal.chosen.push_back(ports_.atoms.tag[i]);
-  if (++rows_[i].waited >= longest_wait) proposal.overdue_tags.push_back(ports_.atoms.tag[i]);
+  proposal.chosen.push_back(bed_.atoms.tag[i]);
+  if (++rows_[i].waited >= longest_wait) proposal.overdue_tags.push_back(bed_.atoms.tag[i]);
 }
 
 void Survey::choose_deep(const Patience& patience, Cover& cover, Proposal& proposal) {
-  for (int i = 0; i < ports_.atoms.owned; ++i) {
-    if (shell_[i].locked || rows_[i].calm < looks_for(i, patience)) continue;
+  for (int i = 0; i < bed_.atoms.owned; ++i) {
+    if (bed_.shell[i].locked || rows_[i].calm < looks_for(i, patience)) continue;
     if (cover.is_deep(i))
       choose(i, proposal);
     else
@@ -274,21 +275,21 @@ void Survey::choose_deep(const Patience& patience, Cover& cover, Proposal& propo
 /// A granule that woke and still stands where it stood has shown before that it bears its load there: half of the looks.
 int Survey::looks_for(int i, const Patience& patience) const {
   if (patience.quick || !rows_[i].woken) return patience.looks;
-  const Vec3 way = solid_.nearest_image(ports_.atoms.place(i), rows_[i].woke_at) - rows_[i].woke_at;
-  return way.norm() > stands_share * scales_.diameter() ? patience.looks : (patience.looks + 1) / 2;
+  const Vec3 way = bed_.solid.nearest_image(bed_.atoms.place(i), rows_[i].woke_at) - rows_[i].woke_at;
+  return way.norm() > stands_share * bed_.scales.diameter() ? patience.looks : (patience.looks + 1) / 2;
 }
 
 /// Calm for as many looks as what presses on it asks for.
 bool Survey::calm_enough(int i, const Patience& patience) const {
   const double factor =
-      patience.quick ? 1 : SolidStateLaw::patience(ports_.atoms.mass[i] * scales_.gravity(), rows_[i].normal_load);
+      patience.quick ? 1 : SolidStateLaw::patience(bed_.atoms.mass[i] * bed_.scales.gravity(), rows_[i].normal_load);
   return rows_[i].calm >= factor * looks_for(i, patience);
 }
 
 void Survey::choose_asleep(const Patience& patience, Proposal& proposal) {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   SphereCells awake;
-  const double cover = scales_.depth();
+  const double cover = bed_.scales.depth();
   if (cover > 0) {
     std::vector<Sphere> spheres;
     struct Row {
@@ -297,17 +298,16 @@ void Survey::choose_asleep(const Patience& patience, Proposal& proposal) {
     };
     std::vector<Row> rows;
     for (int i = 0; i < atoms.owned; ++i) {
-      if (shell_[i].locked || calm_enough(i, patience)) continue;
+      if (bed_.shell[i].locked || calm_enough(i, patience)) continue;
       spheres.push_back(atoms.sphere(i));
       rows.push_back({triple(atoms.place(i)), atoms.radius[i]});
     }
-    if (ports_.ranks.has_neighbours())
-      for (const Row& r : ports_.ranks.exchange(rows, cover + contact_reach(ports_, solid_)))
-        spheres.push_back({vec(r.at), r.radius});
-    awake.build(std::move(spheres), std::max(cover, 2 * scales_.diameter()));
+    if (bed_.ranks.has_neighbours())
+      for (const Row& r : bed_.ranks.exchange(rows, cover + contact_reach(bed_))) spheres.push_back({vec(r.at), r.radius});
+    awake.build(std::move(spheres), std::max(cover, 2 * bed_.scales.diameter()));
   }
   for (int i = 0; i < atoms.owned; ++i) {
-    if (shell_[i].locked) continue;
+    if (bed_.shell[i].locked) continue;
     if (calm_enough(i, patience) && !(cover > 0 && awake.any_near(atoms.sphere(i), cover)))
       choose(i, proposal);
     else
@@ -316,19 +316,19 @@ void Survey::choose_asleep(const Patience& patience, Proposal& proposal) {
 }
 
 void Survey::tie(Proposal& proposal) {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   const int owned = atoms.owned;
   FlatMap<char> chosen = set_of(proposal.chosen);
   std::vector<char> will_be_locked(static_cast<std::size_t>(owned + atoms.ghosts), 1);
   for (int i = 0; i < owned; ++i) will_be_locked[i] = atoms.is_interface(i) || chosen.contains(atoms.tag[i]);
   std::vector<char> touching(static_cast<std::size_t>(owned), 0), goes_along(static_cast<std::size_t>(owned), 0);
-  ports_.contacts.neighbours().for_each_pair(owned, [&](int i, int j, int k) {
+  bed_.contacts.neighbours().for_each_pair(owned, [&](int i, int j, int k) {
     const double radii = atoms.radius[i] + atoms.radius[j];
     const double distance = (atoms.place(i) - atoms.place(j)).norm();
     if (distance > radii * (1 + SolidStateLaw::gap)) return;
     const bool first = will_be_locked[i], second = will_be_locked[j];
-    const bool bears = distance <= radii * ports_.contacts.reach_factor;
-    if (!bears && scales_.solid_state().spins_beside(state_of(atoms, i), state_of(atoms, j))) return;
+    const bool bears = distance <= radii * bed_.contacts.reach_factor;
+    if (!bears && bed_.scales.solid_state().spins_beside(state_of(atoms, i), state_of(atoms, j))) return;
     if (first && second) proposal.touches.push_back({atoms.tag[i], atoms.tag[j]});
     touching[i] = 1;
     goes_along[i] |= second;
@@ -337,8 +337,8 @@ void Survey::tie(Proposal& proposal) {
       goes_along[j] |= first;
     }
     // between owned granules the force is taken in the very state that is frozen; across ranks it is taken now
-    const bool side_change = first && second && j >= owned && shell_[i].locked && !atoms.is_interface(j);
-    if (side_change && bears) proposal.side_changes.push_back({atoms.tag[i], atoms.tag[j], ports_.contacts.force_on_first(i, k)});
+    const bool side_change = first && second && j >= owned && bed_.shell[i].locked && !atoms.is_interface(j);
+    if (side_change && bears) proposal.side_changes.push_back({atoms.tag[i], atoms.tag[j], bed_.contacts.force_on_first(i, k)});
   });
   // alone among neighbours that all stay exterior it would make no solid: nothing is saved until one of them comes along
   for (int i = 0; i < owned; ++i) {

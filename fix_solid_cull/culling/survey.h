@@ -5,15 +5,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "body_groups.h"
+#include "bed.h"
 #include "body_motion.h"
 #include "cover.h"
 #include "flat_map.h"
 #include "pacing.h"
 #include "per_granule.h"
-#include "ports.h"
 #include "proposal.h"
-#include "shell.h"
 #include "wall_survey.h"
 
 namespace solidcull {
@@ -63,17 +61,16 @@ struct AtRest {
 
 class Survey {
  public:
-  Survey(const Ports& ports, const Scales& scales, const Solid& solid, const Shell& shell, const BodyMotion& motion,
-         const BodyGroups& groups, const WallSurvey& walls)
-      : ports_(ports), scales_(scales), solid_(solid), shell_(shell), motion_(motion), groups_(groups), walls_(walls) {}
+  Survey(const Bed& bed, const BodyMotion& motion, const WallSurvey& walls) : bed_(bed), motion_(motion), walls_(walls) {}
 
   const AtRest& operator[](int i) const { return rows_[i]; }
   PerGranule<AtRest>& rows() { return rows_; }
+  bool stands_at_wall(int i) const { return walls_[i].stands; }
   /// Owned granule i is free again.
   void wakes(int i) {
     begin_anew(i);
     rows_[i].woken = true;
-    rows_[i].woke_at = ports_.atoms.place(i);
+    rows_[i].woke_at = bed_.atoms.place(i);
   }
   /// It is locked; if it had been before: whether it has moved by more than d/100 since, where nothing carries it along.
   enum class Rested { first_time, unmoved, moved };
@@ -81,8 +78,8 @@ class Survey {
     begin_anew(i);
     if (!rows_[i].woken) return Rested::first_time;
     rows_[i].woken = false;
-    const Vec3 way = solid_.nearest_image(ports_.atoms.place(i), rows_[i].woke_at) - rows_[i].woke_at;
-    return way.norm() > moved_share * scales_.diameter() ? Rested::moved : Rested::unmoved;
+    const Vec3 way = bed_.solid.nearest_image(bed_.atoms.place(i), rows_[i].woke_at) - rows_[i].woke_at;
+    return way.norm() > moved_share * bed_.scales.diameter() ? Rested::moved : Rested::unmoved;
   }
 
   // --- a look, in this order
@@ -126,12 +123,8 @@ class Survey {
   bool calm_enough(int i, const Patience& patience) const;
   void choose(int i, Proposal& proposal);
 
-  const Ports& ports_;
-  const Scales& scales_;
-  const Solid& solid_;
-  const Shell& shell_;
+  const Bed& bed_;
   const BodyMotion& motion_;
-  const BodyGroups& groups_;
   const WallSurvey& walls_;
   PerGranule<AtRest> rows_;
 };

@@ -5,14 +5,14 @@
 namespace solidcull {
 
 bool WallSurvey::a_wall_has_gone() {
-  std::vector<std::string> now = ports_.walls.names();
+  std::vector<std::string> now = bed_.walls.names();
   const bool gone = !std::includes(now.begin(), now.end(), names_then_.begin(), names_then_.end());
   names_then_ = std::move(now);
   return gone;
 }
 
 void WallSurvey::update(const std::vector<WallContact>& contacts, bool new_run) {
-  const Atoms& atoms = ports_.atoms;
+  const Atoms& atoms = bed_.atoms;
   std::vector<AtWall> now(static_cast<std::size_t>(atoms.owned));
   std::vector<int> there(static_cast<std::size_t>(atoms.owned), 0);
   for (AtWall& w : now) w.near = w.moving_near = false;
@@ -32,7 +32,7 @@ void WallSurvey::update(const std::vector<WallContact>& contacts, bool new_run) 
     const AtWall& then = rows_[i];
     // between runs a wall may have been taken away; within one, a wall that moves may have left
     const bool gone = new_run ? there[i] < then.touched : then.moves && there[i] == 0;
-    if (shell_[i].locked && gone) wake_.ask(atoms.place(i), 0.5 * atoms.radius[i]);
+    if (bed_.shell[i].locked && gone) wake_.ask(atoms.place(i), 0.5 * atoms.radius[i]);
     rows_[i] = now[i];
   }
 }

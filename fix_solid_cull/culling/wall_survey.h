@@ -6,9 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "bed.h"
 #include "per_granule.h"
-#include "ports.h"
-#include "shell.h"
 #include "wake_requests.h"
 
 namespace solidcull {
@@ -40,7 +39,7 @@ struct AtWall {
 /// Local.
 class WallSurvey {
  public:
-  explicit WallSurvey(const Ports& ports, const Shell& shell, WakeRequests& wake) : ports_(ports), shell_(shell), wake_(wake) {}
+  WallSurvey(const Bed& bed, WakeRequests& wake) : bed_(bed), wake_(wake) {}
 
   const AtWall& operator[](int i) const { return rows_[i]; }
   PerGranule<AtWall>& rows() { return rows_; }
@@ -57,7 +56,7 @@ class WallSurvey {
   /// A run has ended.
   void remember_walls() { fingerprint_ = fingerprint(); }
   /// Whether walls that stand still may be others than at the end of the last run, on any rank. Collective.
-  bool walls_are_others() const { return ports_.ranks.any(fingerprint_ != fingerprint()); }
+  bool walls_are_others() const { return bed_.ranks.any(fingerprint_ != fingerprint()); }
 
  private:
   // a granule still stands at a wall that is this share of its radius away, or nearer
@@ -65,13 +64,12 @@ class WallSurvey {
 
   /// The skin too: it says what is near.
   std::vector<double> fingerprint() const {
-    std::vector<double> f = ports_.walls.fingerprint();
-    f.push_back(ports_.run.skin);
+    std::vector<double> f = bed_.walls.fingerprint();
+    f.push_back(bed_.run.skin);
     return f;
   }
 
-  const Ports& ports_;
-  const Shell& shell_;
+  const Bed& bed_;
   WakeRequests& wake_;
   PerGranule<AtWall> rows_;
   std::vector<double> fingerprint_;

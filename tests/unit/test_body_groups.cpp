@@ -38,7 +38,7 @@ struct Row {
     parts.lock(tags);
   }
   const SolidBody* body() const {
-    const auto& all = parts.solid.bodies().bodies();
+    const auto& all = parts.bed.solid.bodies().bodies();
     return all.empty() ? nullptr : &all.begin()->second;
   }
   SmallWorld& world;
@@ -61,10 +61,10 @@ TEST(BodyGroups, parts_that_touch_across_borders_have_one_key_and_one_motion_whi
     run_on_ranks(ranks_along_x(ranks), [&](SmallWorld& w) {
       Row row(w, v, -0.035);
       ASSERT_TRUE(row.body()) << ranks;
-      ASSERT_EQ(row.parts.solid.bodies().size(), 1u);
-      const int number = row.parts.solid.bodies().bodies().begin()->first;
-      EXPECT_EQ(row.parts.groups.spans(number), ranks > 1);
-      EXPECT_EQ(row.parts.groups.spanning_bodies(), ranks > 1 ? 1u : 0u);
+      ASSERT_EQ(row.parts.bed.solid.bodies().size(), 1u);
+      const int number = row.parts.bed.solid.bodies().bodies().begin()->first;
+      EXPECT_EQ(row.parts.bed.groups.spans(number), ranks > 1);
+      EXPECT_EQ(row.parts.bed.groups.spanning_bodies(), ranks > 1 ? 1u : 0u);
       const double m = w.mass_of(r);
       Vec3 momentum = Vec3::Zero(), centre = Vec3::Zero(), turning = Vec3::Zero();
       for (int k = 0; k < 8; ++k) {
@@ -78,7 +78,7 @@ TEST(BodyGroups, parts_that_touch_across_borders_have_one_key_and_one_motion_whi
       EXPECT_LT((motion.mass() * motion.velocity() - momentum).norm(), 1e-12 * momentum.norm());
       EXPECT_LT((motion.angular_momentum() - turning).norm(), 1e-9 * turning.norm());
       const std::lock_guard<std::mutex> lock(mutex);
-      keys.push_back(row.parts.groups.key_of(number));
+      keys.push_back(row.parts.bed.groups.key_of(number));
     });
     ASSERT_EQ(keys.size(), static_cast<std::size_t>(ranks));
     for (const int key : keys) EXPECT_EQ(key, keys.front());
@@ -92,12 +92,12 @@ TEST(BodyGroups, each_body_is_counted_once_over_all_ranks_and_ghosts_know_their_
     row.add(11, some_velocities(2), 0.03, 0.03);   // all on rank 1
     row.lock();
     std::int64_t first_parts = 0;
-    for (const auto& b : row.parts.solid.bodies().bodies()) first_parts += row.parts.groups.has_key_of_first_part(b.first);
+    for (const auto& b : row.parts.bed.solid.bodies().bodies()) first_parts += row.parts.bed.groups.has_key_of_first_part(b.first);
     w.ranks.sum(&first_parts, 1);
     EXPECT_EQ(first_parts, 2);
     row.parts.reneighbour();
-    const int key = row.parts.groups.key_of(row.parts.body_of(w.ranks.me == 0 ? 2 : 3));
-    const int* ghost = row.parts.groups.ghost(w.ranks.me == 0 ? 3 : 2);
+    const int key = row.parts.bed.groups.key_of(row.parts.body_of(w.ranks.me == 0 ? 2 : 3));
+    const int* ghost = row.parts.bed.groups.ghost(w.ranks.me == 0 ? 3 : 2);
     ASSERT_TRUE(ghost);
     EXPECT_EQ(*ghost, key);
     // so the pair across the border leaves the lists, as those within ranks do
@@ -109,11 +109,11 @@ TEST(BodyGroups, ranks_that_hold_no_part_take_part_in_what_is_collective) {
   run_on_ranks(ranks_along_x(3), [](SmallWorld& w) {
     Row row(w, some_velocities(4), -0.04);  // across the border at -0.02; rank 2 has nothing
     EXPECT_EQ(row.body() == nullptr, w.ranks.me == 2);
-    EXPECT_EQ(row.parts.groups.spanning_bodies(), 1u);
-    row.parts.groups.settle();
+    EXPECT_EQ(row.parts.bed.groups.spanning_bodies(), 1u);
+    row.parts.bed.groups.settle();
     row.parts.reneighbour();
     row.parts.compute_forces();
-    EXPECT_EQ(row.parts.groups.spanning_bodies(), 1u);
+    EXPECT_EQ(row.parts.bed.groups.spanning_bodies(), 1u);
   });
 }
 
@@ -143,7 +143,7 @@ Vec3 spin_after_a_push(int ranks, int granules) {
   run_on_ranks(deck, [&](SmallWorld& w) {
     Row row(w, std::vector<Vec3>(static_cast<std::size_t>(granules), Vec3(0, 1e-3, 0)), -3.5 * apart);
     ASSERT_TRUE(row.body());
-    SolidBody& body = row.parts.solid.bodies_in_motion().begin()->second;
+    SolidBody& body = row.parts.bed.solid.bodies_in_motion().begin()->second;
     EXPECT_LT((body.motion.velocity() - Vec3(0, 1e-3, 0)).norm(), 1e-15);
     body.kick(Vec3::Zero(), Vec3(1e-6, 0, 1e-6), 1e-3);
     const std::lock_guard<std::mutex> lock(mutex);
@@ -170,10 +170,10 @@ TEST(BodyGroups, what_came_apart_at_a_border_is_two_bodies_again_each_with_its_o
     Wakes wakes;
     wakes.balls.push_back({Vec3::Zero(), 0.9 * apart});
     row.parts.change(wakes, {});
-    ASSERT_EQ(row.parts.solid.bodies().size(), 1u);
-    const int number = row.parts.solid.bodies().bodies().begin()->first;
-    EXPECT_FALSE(row.parts.groups.spans(number));
-    EXPECT_EQ(row.parts.groups.spanning_bodies(), 0u);
+    ASSERT_EQ(row.parts.bed.solid.bodies().size(), 1u);
+    const int number = row.parts.bed.solid.bodies().bodies().begin()->first;
+    EXPECT_FALSE(row.parts.bed.groups.spans(number));
+    EXPECT_EQ(row.parts.bed.groups.spanning_bodies(), 0u);
     EXPECT_EQ(row.body()->mass.count, 3);
     // it goes on with the velocity field that it had as a part
     EXPECT_LT((row.body()->motion.velocity() - whole.twist().at(row.body()->motion.centre())).norm(), 1e-12);

@@ -29,7 +29,7 @@ struct Bar {
     world.reneighbour();
     world.compute_forces();
   }
-  std::size_t bodies() const { return parts.solid.bodies().size(); }
+  std::size_t bodies() const { return parts.bed.solid.bodies().size(); }
   void wake(int from, int to) {
     Wakes wakes;
     for (int t = from; t <= to; ++t) wakes.balls.push_back({world.atoms.place(world.at(t)), 0.1 * d});
@@ -37,13 +37,13 @@ struct Bar {
   }
   /// Largest difference (voxels) between what is kept and what would be made now.
   double difference() {
-    BodyMeshes fresh(parts.ports, parts.scales, parts.solid, parts.shell, parts.index, parts.masses, parts.shown);
+    BodyMeshes fresh(parts.bed, parts.shown);
     const auto &a = parts.meshes.ask(), &b = fresh.ask();
     EXPECT_EQ(a.size(), b.size());
     double most = 0;
     for (const auto& [body, mesh] : b)
       for (const Vec3& v : mesh.triangles().vertices)
-        most = std::max(most, std::abs(a.at(body).signed_distance(v) - mesh.signed_distance(v)) / parts.scales.voxel());
+        most = std::max(most, std::abs(a.at(body).signed_distance(v) - mesh.signed_distance(v)) / parts.bed.scales.voxel());
     return most;
   }
   bool holds(int tag) {
@@ -53,7 +53,7 @@ struct Bar {
   }
   void expect_right(const char* when) {
     EXPECT_LT(difference(), 0.01) << when;
-    for (int i = 0; i < world.atoms.owned; ++i) EXPECT_EQ(holds(world.atoms.tag[i]), parts.shell.locked(i)) << when;
+    for (int i = 0; i < world.atoms.owned; ++i) EXPECT_EQ(holds(world.atoms.tag[i]), parts.bed.shell.locked(i)) << when;
   }
 };
 
@@ -63,7 +63,7 @@ TEST(BodyMeshes, are_as_fresh_ones_whatever_becomes_of_the_bodies) {
   bar.parts.lock(tags(64, 108));
   ASSERT_EQ(bar.bodies(), 2u);
   bar.expect_right("two bodies");
-  for (auto& b : bar.parts.solid.bodies_in_motion())  // each has a frame of its own now
+  for (auto& b : bar.parts.bed.solid.bodies_in_motion())  // each has a frame of its own now
     b.second.pose.shift(1e-4 * d * Vec3(b.first, 1, -1));
   bar.expect_right("in frames that have moved");
   bar.parts.lock(tags(46, 63));

@@ -28,7 +28,7 @@ struct Cube {
   bool deep(int i, int j, int k) { return parts.cover.is_deep(world.at(tag(i, j, k))); }
   void remove_above(int layer) {
     for (int t = n * n * n; t > layer * n * n; --t)
-      if (const int i = world.at(t); i >= 0 && !parts.shell[i].locked) world.atoms.take_out(i);
+      if (const int i = world.at(t); i >= 0 && !parts.bed.shell[i].locked) world.atoms.take_out(i);
     world.reneighbour();
   }
 
@@ -164,13 +164,13 @@ TEST(Cover, an_interface_granule_that_loses_its_cover_asks_to_wake) {
   cube.parts.motion.refresh();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
-  const std::size_t after_one = cube.parts.wake.take(cube.world.ranks, cube.parts.scales.wake_up()).balls.size();
+  const std::size_t after_one = cube.parts.wake.take(cube.world.ranks, cube.parts.bed.scales.wake_up()).balls.size();
   cube.remove_above(5);  // the second: half a diameter is left
   cube.parts.motion.is_stale();
   cube.parts.motion.refresh();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
-  const Wakes wakes = cube.parts.wake.take(cube.world.ranks, cube.parts.scales.wake_up());
+  const Wakes wakes = cube.parts.wake.take(cube.world.ranks, cube.parts.bed.scales.wake_up());
   EXPECT_LE(after_one, 9u);  // at most the topmost nine
   // now all nine of them, whoever else
   for (int i = 2; i < 5; ++i)
@@ -185,7 +185,7 @@ TEST(Cover, storing_and_fetching_leaves_the_surface_as_it_is) {
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
   EXPECT_TRUE(cube.deep(2, 2, 2));
-  cube.parts.index.index(cube.world.atoms);
+  cube.parts.bed.index.index(cube.world.atoms);
   cube.parts.exchange.bring_back(Cube::tag(3, 3, 3));
   cube.parts.reneighbour();
   cube.parts.cover.draw();
@@ -199,7 +199,7 @@ TEST(Cover, a_mass_that_moves_as_one_keeps_its_surface_and_the_observer_rides_on
   const Pose before = cube.parts.cover.observer();
   const Vec3 shift(0.3, 0.1, 0);
   for (int i = 0; i < cube.world.atoms.owned; ++i) cube.world.atoms.set_place(i, cube.world.atoms.place(i) + shift);
-  cube.parts.solid.body(cube.parts.body_of(Cube::tag(3, 3, 3))).shift(shift);
+  cube.parts.bed.solid.body(cube.parts.body_of(Cube::tag(3, 3, 3))).shift(shift);
   cube.world.reneighbour();
   cube.parts.motion.is_stale();
   cube.parts.motion.refresh();

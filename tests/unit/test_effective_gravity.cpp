@@ -25,10 +25,10 @@ struct Block {
     parts.lock(tags);
     parts.motion.refresh();
     number = parts.body_of(1);
-    key = parts.groups.key_of(number);
-    window = std::max(parts.scales.look_every(), static_cast<int>(std::ceil(10 * n)));
+    key = parts.bed.groups.key_of(number);
+    window = std::max(parts.bed.scales.look_every(), static_cast<int>(std::ceil(10 * n)));
   }
-  SolidBody& body() { return parts.solid.body(number); }
+  SolidBody& body() { return parts.bed.solid.body(number); }
   void watch() {
     parts.motion.is_stale();
     parts.motion.refresh();
@@ -57,7 +57,7 @@ TEST(EffectiveGravity, a_body_that_stands_wakes_when_gravity_tilts_beyond_its_sh
   for (const Case& c : {Case{7, 0.13, 0.16}, Case{3, 1.3, 1.6}})
     for (const double degrees : {c.sleeps, c.wakes}) {
       Block block(c.n);
-      block.parts.solid.ground(block.number, true);
+      block.parts.bed.solid.ground(block.number, true);
       block.watch();  // what it feels when it is locked
       EXPECT_FALSE(block.asks());
       block.tilt(degrees);
@@ -68,7 +68,7 @@ TEST(EffectiveGravity, a_body_that_stands_wakes_when_gravity_tilts_beyond_its_sh
 
 TEST(EffectiveGravity, slow_turning_adds_up) {
   Block block(7);
-  block.parts.solid.ground(block.number, true);
+  block.parts.bed.solid.ground(block.number, true);
   block.watch();
   for (double degrees = 0.02; degrees < 0.13; degrees += 0.02) {
     block.tilt(degrees);

@@ -47,7 +47,7 @@ struct Resting {
     parts.walls.update(world.walls.contacts(), false);
     parts.motion.refresh();
     parts.grounding.update();
-    parts.groups.settle();
+    parts.bed.groups.settle();
     parts.motion.refresh();
     parts.grounding.share_out_loads();
   }
@@ -57,7 +57,7 @@ struct Resting {
     look();
     step();
   }
-  const SolidBody& body(int tag = 1) { return parts.solid.bodies().body(parts.body_of(tag)); }
+  const SolidBody& body(int tag = 1) { return parts.bed.solid.bodies().body(parts.body_of(tag)); }
 
   SmallWorld world;
   WorldParts parts;
@@ -79,13 +79,13 @@ SmallDeck on_floor() {
 TEST(Grounding, a_body_is_grounded_after_two_looks_at_rest_at_a_wall_that_stands_still) {
   Resting bed(on_ground());
   bed.lock({1, 2, 3});
-  ASSERT_EQ(bed.parts.solid.bodies().size(), 1u);
+  ASSERT_EQ(bed.parts.bed.solid.bodies().size(), 1u);
   bed.step();
   bed.look();
   EXPECT_FALSE(bed.body().grounded);
   bed.look();
   EXPECT_TRUE(bed.body().grounded);
-  EXPECT_TRUE(bed.parts.solid.stands(bed.parts.body_of(1)));
+  EXPECT_TRUE(bed.parts.bed.solid.stands(bed.parts.body_of(1)));
 }
 
 TEST(Grounding, not_at_a_wall_that_can_move) {
@@ -98,7 +98,7 @@ TEST(Grounding, not_at_a_wall_that_can_move) {
 
 TEST(Grounding, not_while_it_moves_or_is_out_of_balance) {
   Resting moves(on_ground()), pressed(on_ground());
-  for (int i = 0; i < 3; ++i) moves.world.atoms.set_velocity(i, Vec3(0.01 * moves.parts.scales.solid_state().speed * 6, 0, 0));
+  for (int i = 0; i < 3; ++i) moves.world.atoms.set_velocity(i, Vec3(0.01 * moves.parts.bed.scales.solid_state().speed * 6, 0, 0));
   moves.lock({1, 2, 3});  // 6 % of the solid-state speed: above the 5 % that is drift
   pressed.lock({1, 2, 3});
   moves.step();
@@ -120,13 +120,13 @@ TEST(Grounding, one_granule_that_spins_on_the_spot_may_go_on_and_its_frame_is_th
   bed.world.atoms.set_spin(0, Vec3(0, 0, 20));  // about the normal: it does not slide
   bed.parts.walls.update(bed.world.walls.contacts(), false);
   bed.lock({1});
-  SolidBody& body = bed.parts.solid.body(bed.parts.body_of(1));
+  SolidBody& body = bed.parts.bed.solid.body(bed.parts.body_of(1));
   body.drift(bed.world.run.dt);  // it has turned since
   ASSERT_NE(body.pose, Pose());
   bed.ground();
   EXPECT_TRUE(bed.body().grounded);
   EXPECT_EQ(bed.body().pose, Pose());
-  EXPECT_LT((bed.parts.shell[0].place - bed.world.atoms.place(0)).norm(), 1e-12);
+  EXPECT_LT((bed.parts.bed.shell[0].place - bed.world.atoms.place(0)).norm(), 1e-12);
   EXPECT_NEAR(bed.body().twist.spin[2], 20, 1e-9);
 }
 
@@ -184,8 +184,8 @@ TEST(Grounding, the_mean_load_follows_when_bodies_merge) {
   bed.ground();
   ASSERT_TRUE(bed.body(1).grounded && bed.body(11).grounded);
   bed.steps(200, {{1, Vec3(0.8 * bed.weight, 0, 0)}});  // of five granules more than a tenth
-  bed.parts.solid.tie(2, 11, bed.parts.masses.by_tag());
-  adopt_places(bed.world.atoms, bed.parts.solid, bed.parts.shell, bed.parts.arrivals);
+  bed.parts.bed.solid.tie(2, 11, bed.parts.bed.masses.by_tag());
+  adopt_places(bed.world.atoms, bed.parts.bed.solid, bed.parts.bed.shell, bed.parts.bed.arrivals);
   ASSERT_EQ(bed.parts.body_of(1), bed.parts.body_of(13));
   bed.parts.motion.is_stale();
   bed.look();
@@ -242,7 +242,7 @@ TEST(Grounding, what_presses_on_a_body_that_stands_is_shared_out_to_the_elements
   // to the last newton, whatever it is shared out to
   EXPECT_LT((bed.pressed() - Vec3(0, 0, -2 * bed.weight) - load).norm(), 1e-9 * bed.weight);
   // two alike: on the triangle of each stored granule half of it
-  const double each = bed.parts.solid.wall_loads().of_all().size() == 1 ? 1.0 : 0.5;
+  const double each = bed.parts.bed.solid.wall_loads().of_all().size() == 1 ? 1.0 : 0.5;
   for (const auto& b : bed.world.walls.borne) {
     if (b.second.pressed.isZero(0)) continue;
     EXPECT_NEAR(b.second.pressed[2] / (-2 * bed.weight + load[2]), each, 1e-9);

@@ -36,7 +36,7 @@ struct Whole {
 
   void add(SmallWorld& w, WorldParts& parts) {
     const std::lock_guard<std::mutex> lock(mutex);
-    const SolidBodies& bodies = parts.solid.bodies();
+    const SolidBodies& bodies = parts.bed.solid.bodies();
     const auto one = [&](int tag, double m, double radius, const Vec3& x, int body) {
       const Twist& twist = bodies.body(body).twist;
       const RigidPart p = RigidPart::granule(m, radius, x, twist.at(x), twist.spin);
@@ -47,19 +47,19 @@ struct Whole {
       tags_by_rank[w.ranks.me].push_back(tag);
     };
     for (int i = 0; i < w.atoms.owned; ++i) {
-      if (!parts.shell[i].in_body()) continue;
+      if (!parts.bed.shell[i].in_body()) continue;
       ++interface_granules;
-      const int body = parts.shell[i].body;
+      const int body = parts.bed.shell[i].body;
       EXPECT_EQ(body, bodies.body_of(w.atoms.tag[i]));
-      const Vec3 x = bodies.pose(body).to_world(parts.shell[i].place);
+      const Vec3 x = bodies.pose(body).to_world(parts.bed.shell[i].place);
       EXPECT_LT((x - w.atoms.place(i)).norm(), 1e-12);
       one(w.atoms.tag[i], w.atoms.mass[i], w.atoms.radius[i], x, body);
     }
-    parts.solid.store().for_each([&](const Resident& g) {
+    parts.bed.solid.store().for_each([&](const Resident& g) {
       ++interior;
-      one(static_cast<int>(g.tag), parts.solid.store().get(g.tag).mass, g.radius, parts.solid.in_world(g), g.body);
+      one(static_cast<int>(g.tag), parts.bed.solid.store().get(g.tag).mass, g.radius, parts.bed.solid.in_world(g), g.body);
       std::vector<double> record;
-      parts.solid.store().record(g.tag, record);
+      parts.bed.solid.store().record(g.tag, record);
       colour += record.back();
     });
     const auto contact = [&](std::int64_t low, std::int64_t high, const double* h) {
@@ -68,15 +68,15 @@ struct Whole {
       const auto known = contacts.emplace(std::make_pair(low, high), history);
       EXPECT_LT((known.first->second - history).norm(), 1e-15);  // on both sides of a border
     };
-    parts.solid.contacts().for_each_contact(contact);
-    parts.solid.store().for_each([&](const Resident& g) {
-      parts.solid.contacts().for_each_elsewhere(g.tag, [&](std::int64_t partner) {
+    parts.bed.solid.contacts().for_each_contact(contact);
+    parts.bed.solid.store().for_each([&](const Resident& g) {
+      parts.bed.solid.contacts().for_each_elsewhere(g.tag, [&](std::int64_t partner) {
         double h[3];
         if (partner < g.tag) return;
-        contact(g.tag, partner, parts.solid.inner_history(g, partner, h) ? h : nullptr);
+        contact(g.tag, partner, parts.bed.solid.inner_history(g, partner, h) ? h : nullptr);
       });
     });
-    for (const auto& b : bodies.bodies()) keys.insert(parts.groups.key_of(b.first));
+    for (const auto& b : bodies.bodies()) keys.insert(parts.bed.groups.key_of(b.first));
   }
 };
 
@@ -111,7 +111,7 @@ struct Block {
     parts.reneighbour();
   }
   void shift(const Vec3& by) {
-    for (auto& [number, body] : parts.solid.bodies_in_motion()) {
+    for (auto& [number, body] : parts.bed.solid.bodies_in_motion()) {
       body.shift(by);
       body.take_twist();
     }
@@ -131,13 +131,13 @@ TEST(Handover, granules_go_to_the_rank_that_owns_their_place_and_nothing_is_lost
       Block block(w, -0.06);
       block.shift(Vec3(0.031, 0, 0));
       before.add(w, block.parts);
-      block.parts.index.index(w.atoms);
+      block.parts.bed.index.index(w.atoms);
       EXPECT_TRUE(block.parts.handover.send_home());
       block.parts.reneighbour();
       after.add(w, block.parts);
-      block.parts.census.count_bodies();
+      block.parts.bed.census.count_bodies();
       EXPECT_NO_THROW(block.parts.invariants.check());
-      block.parts.index.index(w.atoms);
+      block.parts.bed.index.index(w.atoms);
       EXPECT_FALSE(block.parts.handover.send_home());  // all are at home
     });
     EXPECT_EQ(before.interior, 10);
@@ -156,11 +156,11 @@ TEST(Handover, granules_go_to_the_rank_that_owns_their_place_and_nothing_is_lost
 TEST(Handover, what_lags_behind_by_less_than_the_slack_may_wait) {
   run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
     Block block(w, -0.065);  // its last column at -0.0151
-    block.parts.index.index(w.atoms);
+    block.parts.bed.index.index(w.atoms);
     block.parts.handover.send_home();
     block.parts.reneighbour();
     block.shift(Vec3(0.3 * 2 * r, 0, 0));
-    block.parts.index.index(w.atoms);
+    block.parts.bed.index.index(w.atoms);
     EXPECT_FALSE(block.parts.handover.send_home());
   });
 }
@@ -169,7 +169,7 @@ TEST(Handover, an_interface_granule_that_was_announced_and_does_not_come_has_lef
   run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
     Block block(w, -0.06);
     block.shift(Vec3(0.031, 0, 0));
-    block.parts.index.index(w.atoms);
+    block.parts.bed.index.index(w.atoms);
     block.parts.handover.send_home();
     block.parts.lost.remember();
     // the engine takes it along to the next rank only, and drops it where it has gone farther
@@ -180,8 +180,8 @@ TEST(Handover, an_interface_granule_that_was_announced_and_does_not_come_has_lef
     block.parts.lost.add(lost);
     EXPECT_TRUE(block.parts.lost.forget_lost());
     for (const LostGranule& g : lost) EXPECT_EQ(block.parts.body_of(g.tag), 0);
-    block.parts.groups.settle();
-    block.parts.census.count_bodies();
+    block.parts.bed.groups.settle();
+    block.parts.bed.census.count_bodies();
     EXPECT_NO_THROW(block.parts.invariants.check());
     EXPECT_FALSE(block.parts.lost.forget_lost());
   });
@@ -191,15 +191,15 @@ TEST(Handover, what_leaves_the_box_beside_another_rank_is_announced_to_nobody) {
   run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
     Block block(w, -0.06);
     block.shift(Vec3(0.031, 0.1, 0));  // half of it is beyond a side of the box, and some of that beside the other rank
-    block.parts.index.index(w.atoms);
+    block.parts.bed.index.index(w.atoms);
     block.parts.closure.fetch_from_outside();
     block.parts.handover.send_home();
     block.parts.lost.remember();
     w.exchange();
     EXPECT_TRUE(block.parts.handover.take_over().empty());
     EXPECT_TRUE(block.parts.lost.forget_lost());
-    block.parts.groups.settle();
-    block.parts.census.count_bodies();
+    block.parts.bed.groups.settle();
+    block.parts.bed.census.count_bodies();
     EXPECT_NO_THROW(block.parts.invariants.check());
   });
 }
@@ -299,7 +299,7 @@ TEST(Snapshot, what_two_ranks_wrote_is_taken_up_by_any_number_of_ranks) {
   Whole written;
   run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
     Block block(w, -0.03);
-    block.parts.solid.count_carves(3);
+    block.parts.bed.solid.count_carves(3);
     written.add(w, block.parts);
     file.write(w, block.parts);
   });
@@ -309,16 +309,16 @@ TEST(Snapshot, what_two_ranks_wrote_is_taken_up_by_any_number_of_ranks) {
     run_on_ranks(ranks_along_x(ranks), [&](SmallWorld& w) {
       WorldParts parts(w, sleeping_settings(), 1.0);  // the scales are the file's
       file.read(w, parts);
-      EXPECT_EQ(parts.scales.diameter(), 2 * r);
+      EXPECT_EQ(parts.bed.scales.diameter(), 2 * r);
       parts.reneighbour();
       read.add(w, parts);
       EXPECT_NO_THROW(parts.invariants.check());
-      std::int64_t counters[2] = {parts.solid.ledger().granules_locked(), parts.solid.ledger().granules_restored()};
+      std::int64_t counters[2] = {parts.bed.solid.ledger().granules_locked(), parts.bed.solid.ledger().granules_restored()};
       w.ranks.sum(counters, 2);
       EXPECT_EQ(counters[0], 24);
       EXPECT_EQ(counters[1], 0);
-      EXPECT_EQ(parts.solid.ledger().carves(), 3);
-      EXPECT_EQ(parts.solid.largest_radius_by_type()[1], r);
+      EXPECT_EQ(parts.bed.solid.ledger().carves(), 3);
+      EXPECT_EQ(parts.bed.solid.largest_radius_by_type()[1], r);
     });
     expect_alike(read, written);
   }
@@ -342,7 +342,7 @@ TEST(Handover, contacts_that_join_bodies_of_one_rank_are_no_matter_of_the_next) 
       proposal.joins = {{triple(Vec3(-0.006, 0, 0)), 1, 2}};
     }
     parts.change({}, proposal);
-    EXPECT_EQ(parts.solid.contacts().contains(1, 2), w.ranks.me == 0);
+    EXPECT_EQ(parts.bed.solid.contacts().contains(1, 2), w.ranks.me == 0);
     if (w.ranks.me == 0) EXPECT_EQ(parts.body_of(1), parts.body_of(2));
   });
 }
@@ -352,7 +352,7 @@ TEST(Snapshot, on_as_many_ranks_everything_is_as_it_was_to_the_last_bit) {
     File first, second;
     run_on_ranks(ranks_along_x(ranks), [&](SmallWorld& w) {
       Block block(w, -0.03);
-      for (auto& [number, body] : block.parts.solid.bodies_in_motion())
+      for (auto& [number, body] : block.parts.bed.solid.bodies_in_motion())
         for (int n = 0; n < 10; ++n) body.drift(1e-4);  // frames are turned
       block.shift(Vec3::Zero());
       first.write(w, block.parts);
@@ -377,7 +377,7 @@ TEST(Snapshot, the_users_faults_are_named) {
   WorldParts parts(world, sleeping_settings(), 2 * r);
   parts.snapshot.read(file.state, file.end);
   world.contacts.width = 0;  // another contact model
-  parts.solid.set_histories(world.contacts.flips(), world.contacts.vectors());
+  parts.bed.solid.set_histories(world.contacts.flips(), world.contacts.vectors());
   EXPECT_THROW(parts.snapshot.take_up(), InputError);
 }
 

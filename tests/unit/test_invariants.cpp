@@ -20,9 +20,9 @@ struct TwoBodies {
     parts.put_away({2, 3});
     parts.reneighbour();
   }
-  GranuleStore& store() { return const_cast<GranuleStore&>(parts.solid.store()); }
-  Ledger& ledger() { return const_cast<Ledger&>(parts.solid.ledger()); }
-  SolidBody& body(int tag) { return parts.solid.body(parts.body_of(tag)); }
+  GranuleStore& store() { return const_cast<GranuleStore&>(parts.bed.solid.store()); }
+  Ledger& ledger() { return const_cast<Ledger&>(parts.bed.solid.ledger()); }
+  SolidBody& body(int tag) { return parts.bed.solid.body(parts.body_of(tag)); }
   std::string broken() {
     try {
       parts.invariants.check();
@@ -79,13 +79,13 @@ TEST(Invariants, mass_lost_from_the_store_is_seen) {
 TEST(Invariants, a_locked_granule_without_a_body_or_the_other_way_round_is_seen) {
   TwoBodies two;
   const int i = two.world.at(14);
-  two.parts.shell.unlock(two.world.atoms, i);
+  two.parts.bed.shell.unlock(two.world.atoms, i);
   EXPECT_TRUE(says(two.broken(), "8 granules are in bodies and 7 are locked"));
 }
 
 TEST(Invariants, an_interface_granule_in_the_wrong_body_is_seen) {
   TwoBodies two;
-  two.parts.shell.set_body(two.world.at(14), two.parts.body_of(1));
+  two.parts.bed.shell.set_body(two.world.at(14), two.parts.body_of(1));
   EXPECT_TRUE(says(two.broken(), "interface granule 14 stands in the wrong body"));
 }
 
@@ -123,8 +123,8 @@ TEST(LostAtoms, what_leaves_the_box_leaves_its_body) {
   EXPECT_TRUE(two.parts.lost.forget_lost());
   EXPECT_EQ(two.parts.body_of(14), 0);
   EXPECT_EQ(two.body(11).mass.count, 3);
-  EXPECT_FALSE(two.parts.solid.contacts().contains(13, 14));
-  EXPECT_TRUE(two.parts.solid.contacts().contains(12, 13));
+  EXPECT_FALSE(two.parts.bed.solid.contacts().contains(13, 14));
+  EXPECT_TRUE(two.parts.bed.solid.contacts().contains(12, 13));
   EXPECT_EQ(two.broken(), "");
   EXPECT_FALSE(two.parts.lost.forget_lost());
 }
@@ -137,7 +137,7 @@ TEST(LostAtoms, a_body_that_loses_its_middle_comes_apart) {
   EXPECT_NE(two.parts.body_of(11), two.parts.body_of(13));
   EXPECT_EQ(two.parts.body_of(13), two.parts.body_of(14));
   EXPECT_EQ(two.body(11).mass.count, 1);
-  EXPECT_EQ(two.parts.shell[two.world.at(14)].body, two.parts.body_of(14));
+  EXPECT_EQ(two.parts.bed.shell[two.world.at(14)].body, two.parts.body_of(14));
   EXPECT_EQ(two.broken(), "");
 }
 
@@ -177,7 +177,7 @@ TEST(Report, says_what_all_granules_have_together) {
   EXPECT_NEAR(before[0], 9 * m, 1e-12 * m);
   const double of_bodies = before[4] + before[5] - 0.5 * m * 4 - 0.5 * inertia * 900;
   EXPECT_NEAR(of_bodies,
-              two.parts.solid.kinetic_energy(two.parts.body_of(1)) + two.parts.solid.kinetic_energy(two.parts.body_of(11)),
+              two.parts.bed.solid.kinetic_energy(two.parts.body_of(1)) + two.parts.bed.solid.kinetic_energy(two.parts.body_of(11)),
               1e-12 * before[4]);
   two.parts.put_away({4, 14});  // whoever is stored, the sums are the same
   ++two.world.run.step;

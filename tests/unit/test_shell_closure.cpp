@@ -22,22 +22,22 @@ struct Row {
     parts.walls.update({}, false);
   }
   static Vec3 x(int tag) { return Vec3((tag - 1) * 0.999 * 2 * r, 0, 0); }
-  void ground() { parts.solid.ground(parts.body_of(1), true); }
+  void ground() { parts.bed.solid.ground(parts.body_of(1), true); }
   std::size_t fetch() {
-    parts.census.count_bodies();
-    parts.census.count_stored();
+    parts.bed.census.count_bodies();
+    parts.bed.census.count_stored();
     parts.closure.share();
     return parts.closure.fetch_what_is_near();
   }
   std::size_t store() {
-    parts.index.index(world.atoms);
-    parts.census.count_bodies();
+    parts.bed.index.index(world.atoms);
+    parts.bed.census.count_bodies();
     parts.closure.share();
     return parts.closure.store_what_is_deep(true, true);
   }
   Tags stored() const {
     Tags all;
-    parts.solid.store().for_each([&](const Resident& g) { all.insert(g.tag); });
+    parts.bed.solid.store().for_each([&](const Resident& g) { all.insert(g.tag); });
     return all;
   }
   /// An exterior granule beside the fifth of the row, its surface so many skins away.
@@ -74,7 +74,7 @@ TEST(ShellClosure, what_comes_within_the_skin_makes_a_stored_granule_an_atom) {
       const int i = near.world.at(5);
       ASSERT_GE(i, 0);
       EXPECT_EQ(near.world.atoms.place(i), Row::x(5));
-      EXPECT_TRUE(near.parts.shell.locked(i));
+      EXPECT_TRUE(near.parts.bed.shell.locked(i));
       EXPECT_EQ(far.fetch(), 0u) << radius;
     }
 }
@@ -143,7 +143,7 @@ TEST(ShellClosure, who_was_clear_is_looked_at_again_when_something_comes_to_stan
   row.visitor(0.5);
   ASSERT_EQ(row.fetch(), 0u);  // 5 is an atom: the visitor is clear of the store
   row.parts.put_away({5});     // as another rank or a file brings it: nobody asked who is near
-  row.parts.solid.stands_otherwise();
+  row.parts.bed.solid.stands_otherwise();
   EXPECT_EQ(row.fetch(), 1u);
   EXPECT_EQ(row.stored().count(5), 0u);
 }
@@ -153,7 +153,7 @@ TEST(ShellClosure, who_was_clear_is_looked_at_again_when_a_body_comes_to_stand) 
   row.parts.put_away(row.tags);
   row.visitor(4);
   ASSERT_EQ(row.fetch(), 0u);
-  SolidBody& body = row.parts.solid.body(row.parts.body_of(1));
+  SolidBody& body = row.parts.bed.solid.body(row.parts.body_of(1));
   body.shift(Vec3(0, 3.5 * row.skin, 0));  // it moved there
   row.ground();
   EXPECT_EQ(row.fetch(), 1u);
@@ -183,7 +183,7 @@ struct TwoRows : Row {
 
 TEST(ShellClosure, the_shell_of_another_body_makes_stored_granules_atoms_unless_both_stand) {
   TwoRows near(0.9), far(1.1), stand(0.9);
-  for (const int tag : {1, 21}) stand.parts.solid.ground(stand.parts.body_of(tag), true);
+  for (const int tag : {1, 21}) stand.parts.bed.solid.ground(stand.parts.body_of(tag), true);
   ASSERT_NE(near.parts.body_of(1), near.parts.body_of(21));
   near.parts.put_away({5});
   stand.parts.put_away({5});
@@ -196,7 +196,7 @@ TEST(ShellClosure, the_shell_of_another_body_makes_stored_granules_atoms_unless_
 
 TEST(ShellClosure, shells_near_another_body_stay_atoms_unless_both_stand) {
   TwoRows near(2.4), far(2.6), stand(2.4);
-  for (const int tag : {1, 21}) stand.parts.solid.ground(stand.parts.body_of(tag), true);
+  for (const int tag : {1, 21}) stand.parts.bed.solid.ground(stand.parts.body_of(tag), true);
   for (TwoRows* rows : {&near, &far, &stand}) rows->world.add(99, Vec3(0.5, 0.5, 0), r);  // the highest tag
   for (TwoRows* rows : {&near, &far, &stand}) rows->parts.walls.update({}, false);
   EXPECT_EQ(near.store(), 0u);
@@ -233,7 +233,7 @@ TEST(ShellClosure, a_body_that_moves_to_a_wall_is_fetched_and_one_that_the_wall_
     Row row(deck);
     row.parts.put_away(row.tags);
     EXPECT_EQ(row.fetch(), 0u);
-    row.parts.solid.body(row.parts.body_of(1)).shift(Vec3(0, 0, -0.3 * row.skin));
+    row.parts.bed.solid.body(row.parts.body_of(1)).shift(Vec3(0, 0, -0.3 * row.skin));
     EXPECT_EQ(row.fetch(), 10u) << plane;
     // at rest there: walls that stand still hold it
     row.ground();
@@ -344,7 +344,7 @@ TEST(ShellClosure, what_leaves_the_box_becomes_an_atom) {
   Row row;
   row.parts.put_away(row.tags);
   EXPECT_EQ(row.parts.closure.fetch_from_outside(), 0u);
-  row.parts.solid.body(row.parts.body_of(1)).shift(Vec3(1 - 0.065, 0, 0));  // the side is at 1 m
+  row.parts.bed.solid.body(row.parts.body_of(1)).shift(Vec3(1 - 0.065, 0, 0));  // the side is at 1 m
   EXPECT_EQ(row.parts.closure.fetch_from_outside(), 3u);
   EXPECT_EQ(row.stored(), all_but(10, {8, 9, 10}));
 }
@@ -353,12 +353,12 @@ TEST(ShellClosure, a_box_that_follows_the_granules_holds_what_is_stored) {
   Row row;
   row.world.run.kept = {Vec3::Constant(-HUGE_VAL), Vec3::Constant(HUGE_VAL)};
   row.parts.put_away(row.tags);
-  row.parts.solid.body(row.parts.body_of(1)).shift(Vec3(1 - 0.065, 0, 0));
+  row.parts.bed.solid.body(row.parts.body_of(1)).shift(Vec3(1 - 0.065, 0, 0));
   EXPECT_EQ(row.parts.closure.fetch_from_outside(), 0u);
   Box box{Vec3(-0.5, 0, 0), Vec3(0.5, 0.25, 0)};
-  row.parts.stored.enclose(box);
+  row.parts.bed.stored.enclose(box);
   double farthest = -HUGE_VAL;
-  row.parts.solid.store().for_each([&](const Resident& g) { farthest = std::max(farthest, row.parts.solid.in_world(g)[0]); });
+  row.parts.bed.solid.store().for_each([&](const Resident& g) { farthest = std::max(farthest, row.parts.bed.solid.in_world(g)[0]); });
   EXPECT_GT(farthest, 1);
   EXPECT_NEAR(box.hi[0], farthest, 1e-12);
   EXPECT_EQ(box.lo[0], -0.5);
@@ -393,8 +393,8 @@ TEST(ShellClosure, what_comes_near_on_another_rank_or_through_a_periodic_side_co
     parts.lock({1, 2, 3, 4});
     parts.walls.update({}, false);
     parts.put_away({1, 2, 3, 4});
-    parts.census.count_bodies();
-    parts.census.count_stored();
+    parts.bed.census.count_bodies();
+    parts.bed.census.count_stored();
     parts.closure.share();
     EXPECT_EQ(parts.closure.fetch_what_is_near(), w.ranks.me == 1 ? 2u : 0u);
     EXPECT_EQ(w.at(1) >= 0 && w.at(3) >= 0, w.ranks.me == 1);

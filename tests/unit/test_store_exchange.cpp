@@ -43,7 +43,7 @@ struct Cluster {
   explicit Cluster(const Settings& settings = sleeping_settings(), int width = 3)
       : world(empty_space()), parts(world, settings, 2 * r) {
     world.contacts.width = width;
-    parts.solid.set_histories(world.contacts.flips(), world.contacts.vectors());
+    parts.bed.solid.set_histories(world.contacts.flips(), world.contacts.vectors());
     for (int n = 0; n < 12; ++n) {
       const Vec3 at = 0.98 * 2 * r * Vec3(n % 3, n / 3 % 2, n / 6) + Vec3(0.1, -0.2, 0.3);
       world.add(n + 1, at, r, 1e-4 * Vec3(n % 5, n % 2, 0.3 * n), 0.01 * Vec3(0.7 * n, n % 3, 1));
@@ -82,25 +82,25 @@ TEST(StoreExchange, locked_stored_and_restored_in_one_step_is_a_no_op) {
     for (const auto& s : c.before) pairs += s.second.histories.size();
     ASSERT_GE(pairs, 2u * 15u);
     c.lock();
-    ASSERT_EQ(c.parts.solid.bodies().size(), 1u);
+    ASSERT_EQ(c.parts.bed.solid.bodies().size(), 1u);
     for (int n = 1; n <= 12; ++n) EXPECT_TRUE(c.world.atoms.histories(c.world.at(n)).empty()) << n;
     const std::set<int> stored = some_stored ? std::set<int>{2, 3, 5, 7, 11, 12} : std::set<int>();
     if (some_stored) c.parts.put_away({2, 3, 5, 7, 11, 12});
     EXPECT_EQ(c.world.atoms.owned, some_stored ? 6 : 12);
     c.wake_all();
     ASSERT_EQ(c.world.atoms.owned, 12);
-    EXPECT_EQ(c.parts.solid.locked(), 0u);
-    EXPECT_EQ(c.parts.solid.contacts().size(), 0u);
+    EXPECT_EQ(c.parts.bed.solid.locked(), 0u);
+    EXPECT_EQ(c.parts.bed.solid.contacts().size(), 0u);
     for (int n = 1; n <= 12; ++n) expect_no_op(c.state(n), c.before[n], n, stored);
-    EXPECT_EQ(c.parts.solid.ledger().granules_locked(), 12);
-    EXPECT_EQ(c.parts.solid.ledger().granules_restored(), 12);
+    EXPECT_EQ(c.parts.bed.solid.ledger().granules_locked(), 12);
+    EXPECT_EQ(c.parts.bed.solid.ledger().granules_restored(), 12);
   }
 }
 
 TEST(StoreExchange, without_histories_too) {
   Cluster c(sleeping_settings(), 0);
   c.lock();
-  ASSERT_EQ(c.parts.solid.bodies().size(), 12u);  // nothing ties them but what the survey says touches
+  ASSERT_EQ(c.parts.bed.solid.bodies().size(), 12u);  // nothing ties them but what the survey says touches
   c.parts.put_away({2, 3, 5});
   c.wake_all();
   for (int n = 1; n <= 12; ++n) EXPECT_TRUE(c.state(n) == c.before[n]) << n;
@@ -129,38 +129,38 @@ TEST(StoreExchange, a_granule_that_comes_back_later_has_its_bodys_motion_and_its
   Cluster c;
   c.lock();
   c.parts.put_away({2, 3, 5});
-  c.parts.solid.body(c.parts.body_of(1)).shift(Vec3(0.001, 0, 0));
+  c.parts.bed.solid.body(c.parts.body_of(1)).shift(Vec3(0.001, 0, 0));
   ++c.world.run.step;
   EXPECT_GT(c.parts.exchange.begin_change(), 0u);  // the motions of single granules are forgotten: the body has them
-  const SolidBody& body = c.parts.solid.bodies().body(c.parts.body_of(3));
+  const SolidBody& body = c.parts.bed.solid.bodies().body(c.parts.body_of(3));
   const int i = c.parts.exchange.bring_back(3);
   EXPECT_EQ(c.world.at(3), i);
   EXPECT_LT((c.world.atoms.place(i) - c.before[3].place - Vec3(0.001, 0, 0)).norm(), 1e-15);
-  EXPECT_EQ(c.world.atoms.velocity(i), body.twist.at(body.pose.to_world(c.parts.shell[i].place)));
+  EXPECT_EQ(c.world.atoms.velocity(i), body.twist.at(body.pose.to_world(c.parts.bed.shell[i].place)));
   EXPECT_EQ(c.world.atoms.spin(i), body.twist.spin);
   EXPECT_EQ(c.world.atoms.colour[static_cast<std::size_t>(i)], c.before[3].colour);
   EXPECT_TRUE(c.world.atoms.is_interface(i));
-  EXPECT_EQ(c.parts.index.at(3), i);
+  EXPECT_EQ(c.parts.bed.index.at(3), i);
 }
 
 TEST(StoreExchange, the_index_of_tags_follows_when_atoms_take_other_indices) {
   Cluster c;
   c.lock();
   for (const std::int64_t tag : {1, 12, 6, 4}) {
-    c.parts.exchange.put_away(c.parts.index.at(tag));
-    EXPECT_FALSE(c.parts.index.contains(tag));
-    for (int i = 0; i < c.world.atoms.owned; ++i) EXPECT_EQ(c.parts.index.at(c.world.atoms.tag[i]), i);
+    c.parts.exchange.put_away(c.parts.bed.index.at(tag));
+    EXPECT_FALSE(c.parts.bed.index.contains(tag));
+    for (int i = 0; i < c.world.atoms.owned; ++i) EXPECT_EQ(c.parts.bed.index.at(c.world.atoms.tag[i]), i);
   }
   c.parts.exchange.bring_back(12);
-  for (int i = 0; i < c.world.atoms.owned; ++i) EXPECT_EQ(c.parts.index.at(c.world.atoms.tag[i]), i);
-  EXPECT_THROW(c.parts.index.at(1), InternalError);
+  for (int i = 0; i < c.world.atoms.owned; ++i) EXPECT_EQ(c.parts.bed.index.at(c.world.atoms.tag[i]), i);
+  EXPECT_THROW(c.parts.bed.index.at(1), InternalError);
 }
 
 TEST(ContactFreezing, histories_turn_with_the_body) {
   Cluster c;
   c.lock();
   c.parts.put_away({2, 3, 5, 7});
-  SolidBody& body = c.parts.solid.body(c.parts.body_of(1));
+  SolidBody& body = c.parts.bed.solid.body(c.parts.body_of(1));
   body.kick(Vec3::Zero(), Vec3(3e-4, 6e-4, -5e-4), 0.01);
   for (int n = 0; n < 2000; ++n) body.drift(1e-4);
   body.take_twist();
@@ -213,7 +213,7 @@ struct Neighbour {
     parts.reneighbour();
     parts.compute_forces();
   }
-  double load_change(int tag) { return parts.shell[world.at(tag)].load_change.norm(); }
+  double load_change(int tag) { return parts.bed.shell[world.at(tag)].load_change.norm(); }
   void step() {
     ++world.run.step;
     parts.compute_forces();

@@ -16,8 +16,8 @@ constexpr int looks_to_calm = 4;
 struct Bed {
   explicit Bed(const Settings& settings = sleeping_settings(), const SmallDeck& deck = SmallDeck())
       : world(deck), parts(world, settings, 2 * r) {
-    every = parts.scales.look_every();
-    speed = parts.scales.solid_state().speed;
+    every = parts.bed.scales.look_every();
+    speed = parts.bed.scales.solid_state().speed;
   }
   /// The weight of one granule (N).
   double weight() const { return 9.81 * world.mass_of(r); }
@@ -352,7 +352,7 @@ struct TwoBodies : Bed {
     world.reneighbour();
     world.compute_forces();
     parts.lock({1, 2, 3, 4});
-    SolidBody& second = parts.solid.body(parts.body_of(3));
+    SolidBody& second = parts.bed.solid.body(parts.body_of(3));
     second.shift(Vec3(2 * apart - 0.05, 0, 0));
     second.take_twist();
     parts.motion.refresh();
@@ -376,7 +376,7 @@ TEST(Survey, two_bodies_that_have_rested_against_each_other_are_joined) {
   EXPECT_EQ(bed.proposal.joins[0].a + bed.proposal.joins[0].b, 2 + 3);
   bed.parts.change({}, bed.proposal);
   EXPECT_EQ(bed.parts.body_of(1), bed.parts.body_of(4));
-  EXPECT_EQ(bed.parts.solid.bodies().size(), 1u);
+  EXPECT_EQ(bed.parts.bed.solid.bodies().size(), 1u);
 }
 
 /// The same count, where a granule touches two of the other body.
@@ -390,7 +390,7 @@ TEST(Survey, contacts_do_not_count_one_by_one_before_bodies_join) {
   bed.world.reneighbour();
   bed.world.compute_forces();
   bed.parts.lock({1, 2, 3, 4});
-  SolidBody& second = bed.parts.solid.body(bed.parts.body_of(3));
+  SolidBody& second = bed.parts.bed.solid.body(bed.parts.body_of(3));
   second.shift(Vec3(0, std::sqrt(0.75) * apart - 0.05, 0));
   second.take_twist();
   bed.parts.motion.refresh();

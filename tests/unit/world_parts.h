@@ -4,7 +4,6 @@
 #include <utility>
 #include <vector>
 
-#include "body_changes.h"
 #include "culling_parts.h"
 #include "small_world.h"
 
@@ -33,32 +32,32 @@ struct WorldParts : CullingParts {
     for (FollowsAtoms* f : followers) f->grow(world.atoms.room);
     for (FollowsAtoms* f : followers)
       for (int i = 0; i < world.atoms.owned; ++i) f->reset(i);
-    world.on_arrival = [this](int i) { shell.is_arriving(i); };
-    solid.set_histories(ports.contacts.flips(), ports.contacts.vectors());
+    world.on_arrival = [this](int i) { bed.shell.is_arriving(i); };
+    bed.solid.set_histories(bed.contacts.flips(), bed.contacts.vectors());
     Vec3 periods = world.run.edges();
     for (int k = 0; k < 3; ++k)
       if (!world.run.periodic[static_cast<std::size_t>(k)]) periods[k] = 0;
-    solid.set_periods(periods);
+    bed.solid.set_periods(periods);
     const double g = world.deck.gravity.norm();
-    scales.set(d, g > 0 ? g : Scales::standard_gravity);
-    scales.make_laws(world.run.dt);
-    solid.open_store();
-    solid.pack_contacts_from(0);
+    bed.scales.set(d, g > 0 ? g : Scales::standard_gravity);
+    bed.scales.make_laws(world.run.dt);
+    bed.solid.open_store();
+    bed.solid.pack_contacts_from(0);
   }
 
   /// One membership change as Culling makes it, but for what goes to the store and comes out by the shell's closure. Collective.
   void change(Wakes wakes, Proposal proposal) {
     exchange.begin_change();
     MembershipChange c(for_change(), std::move(wakes), std::move(proposal));
-    index.index(world.atoms);
+    bed.index.index(world.atoms);
     c.free_and_lock();
     c.thaw_and_unlock();
     c.freeze_and_lock();
-    groups.settle();
+    bed.groups.settle();
     c.finish_bodies();
-    census.count_bodies();
-    census.count_stored();
-    label_bodies(world.atoms, shell, groups);
+    bed.census.count_bodies();
+    bed.census.count_stored();
+    bed.label_bodies();
     motion.is_stale();
   }
   /// Owned granules with these tags are locked; what of them touches is one body. Collective.
@@ -77,19 +76,19 @@ struct WorldParts : CullingParts {
   }
   /// This rank's atoms with these tags go to the store.
   void put_away(const std::vector<std::int64_t>& tags) {
-    index.index(world.atoms);
+    bed.index.index(world.atoms);
     for (const std::int64_t tag : tags)
-      if (const int* i = index.find(tag)) exchange.put_away(*i);
+      if (const int* i = bed.index.find(tag)) exchange.put_away(*i);
     motion.is_stale();
   }
   /// Ghosts, lists and what ranks tell each other, as between a change and the next forces. Collective.
   void reneighbour() {
-    census.count_bodies();
-    census.count_stored();
+    bed.census.count_bodies();
+    bed.census.count_stored();
     world.exchange();
     world.borders();
     handover.take_over();
-    groups.share();
+    bed.groups.share();
     world.contacts.build();
     leave_out();
     motion.is_stale();
@@ -97,7 +96,7 @@ struct WorldParts : CullingParts {
   }
   void leave_out() {
     std::vector<int> body;
-    for (int i = 0; i < world.atoms.owned + world.atoms.ghosts; ++i) body.push_back(groups.key_of_atom(i));
+    for (int i = 0; i < world.atoms.owned + world.atoms.ghosts; ++i) body.push_back(bed.groups.key_of_atom(i));
     world.contacts.leave_out_pairs_within(body);
   }
   void compute_forces() {
@@ -106,7 +105,7 @@ struct WorldParts : CullingParts {
     freezing.rebase_thawed();
     motion.take_loads();
   }
-  int body_of(std::int64_t tag) const { return solid.bodies().body_of(tag); }
+  int body_of(std::int64_t tag) const { return bed.solid.bodies().body_of(tag); }
 
   SmallWorld& world;
 };

@@ -1,8 +1,15 @@
-#include "body_changes.h"
+#include "bed.h"
+
+#include <utility>
 
 namespace solidcull {
 
-void split_bodies(const Atoms& atoms, Solid& solid, Shell& shell, const AtomIndex& index, const GranuleMasses& masses) {
+Bed::Bed(const Ports& engine, const Settings& settings, int types)
+    : BedState(engine, settings), stored(*this), masses(*this), groups(*this, stored, masses), census(*this) {
+  solid.set_types(types);
+}
+
+void Bed::split_bodies() {
   solid.split(masses.by_tag(), [&](std::int64_t tag, int body, const Vec3& place) {
     const int i = index.at(tag);
     solid.stands(shell[i].body, {shell[i].place, atoms.radius[i]});
@@ -10,7 +17,7 @@ void split_bodies(const Atoms& atoms, Solid& solid, Shell& shell, const AtomInde
   });
 }
 
-void adopt_places(const Atoms& atoms, Solid& solid, Shell& shell, Arrivals& arrivals) {
+void Bed::adopt_places() {
   const SolidBodies& bodies = solid.bodies();
   for (int i = 0; i < atoms.owned; ++i) {
     if (!shell[i].locked || shell[i].body == Locked::arriving) continue;
@@ -37,7 +44,7 @@ void adopt_places(const Atoms& atoms, Solid& solid, Shell& shell, Arrivals& arri
   solid.adopt_swallowed();
 }
 
-void label_bodies(const Atoms& atoms, Shell& shell, const BodyGroups& groups) {
+void Bed::label_bodies() {
   for (int i = 0; i < atoms.owned; ++i) shell.label(i, shell[i].locked ? groups.key_of(shell[i].body) : 0);
 }
 

@@ -1,0 +1,29 @@
+// The bed: its state, and what is asked of it again and again. Most parts of the culling hold this and little else.
+#pragma once
+
+#include "bed_state.h"
+#include "body_groups.h"
+#include "census.h"
+#include "granule_masses.h"
+#include "stored_search.h"
+
+namespace solidcull {
+
+struct Bed : BedState {
+  Bed(const Ports& engine, const Settings& settings, int types);
+
+  /// After granules were unlocked: bodies that came apart become several; interface granules follow. Local.
+  void split_bodies();
+  /// After bodies merged: granules of swallowed ones move to the frames of the bodies that they are part of now: interface
+  /// granules, those that are to arrive, interior ones. Local.
+  void adopt_places();
+  /// Each atom is labelled with its body's number over all ranks. Local.
+  void label_bodies();
+
+  const StoredSearch stored;
+  const GranuleMasses masses;
+  BodyGroups groups;
+  Census census;
+};
+
+}  // namespace solidcull
