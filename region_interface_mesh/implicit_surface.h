@@ -1,5 +1,5 @@
 // Depth below the bed's outer surface: the distance to the union of implicit spheres, closed over the pores
-// (DESIGN section 6; paper, section on finding interior granules).
+// (theory.md#implicit-surface-and-depth; paper, section on finding interior granules).
 #pragma once
 
 #include <array>

@@ -156,7 +156,7 @@ void InterfaceMesh::bounds(Vec3& lo, Vec3& hi) const {
 
 /// From the distances at the voxel centres. A voxel counts with its share on the inner side of a plane at that distance; the mix
 /// of two such ramps, one and two voxels wide, has no error of second order in voxel / radius of curvature. (The triangles have:
-/// they enclose 1 % less at a radius of ten voxels.)
+/// they enclose 1 % less at a radius of ten voxels.) theory.md#interface-mesh.
 double InterfaceMesh::volume() const {
   const FloatTree& tree = impl_->grid->constTree();
   if (impl_->enclosed) return *impl_->enclosed;

@@ -1,4 +1,4 @@
-// The interface mesh: the implicit surface around one solid body (paper, section "interface surfaces"; DESIGN section 10).
+// The interface mesh: the implicit surface around one solid body (theory.md#interface-mesh; paper, "interface surfaces").
 #pragma once
 
 #include <array>

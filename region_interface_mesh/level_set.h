@@ -1,4 +1,5 @@
-// The level set of a closed union of spheres, as a grid of OpenVDB. Inside the geometry only: nothing else sees OpenVDB.
+// The level set of a closed union of spheres, as a grid of OpenVDB (theory.md#interface-mesh). Inside the geometry only: nothing
+// else sees OpenVDB.
 #pragma once
 
 #include <openvdb/openvdb.h>

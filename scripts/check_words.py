@@ -5,7 +5,7 @@
 
 A sentence has 25 words at most, README.md 100 lines, and every relative link or image leads to a file that is there (and a
 `#heading` to a heading). Paragraphs are cut into sentences; a heading, a list item, a table cell and a picture's caption each
-stand alone. Code blocks do not count, and a `code span` is one word. Prints file, line and text of each fault. Exit: 0 none, 1 some.
+stand alone. Blocks of code and of `$$` formulas do not count; a `code span` is one word, and so is a `$formula$`. Prints file, line and text of each fault. Exit: 0 none, 1 some.
 """
 import argparse
 import re
@@ -21,13 +21,14 @@ MOST_WORDS = 25
 MOST_LINES = {"README.md": 100}  # of the file in the root
 ABBREVIATIONS = {"e.g.", "i.e.", "al.", "cf.", "vs.", "approx.", "eq.", "fig.", "no.", "resp."}
 
-FENCE = re.compile(r"\s*(```|~~~)")
+FENCE = re.compile(r"\s*(```|~~~|\$\$\s*$)")
 ITEM = re.compile(r"\s*(?:[-*+]|\d+[.)])\s+")
 HEADING = re.compile(r"#{1,6}\s+")
 TABLE_RULE = re.compile(r"\s*\|?[\s:|-]+\|?\s*$")
 IMAGE = re.compile(r"!\[([^\]]*)\]\(([^)\s]+)[^)]*\)")
 LINK = re.compile(r"\[([^\]]*)\]\(([^)\s]+)[^)]*\)")
 CODE = re.compile(r"(`+)(.+?)\1")
+FORMULA = re.compile(r"\$[^$]+\$")
 CELL_EDGE = re.compile(r"(?<!\\)\|")
 HIDDEN = {c: chr(0xE000 + c) for c in range(128) if not chr(c).isalnum()}  # of code, in characters that mean nothing
 SHOWN = {ord(h): chr(c) for c, h in HIDDEN.items()}
@@ -46,8 +47,8 @@ class Sentence(NamedTuple):
 
 
 def hide_code(line):
-    """The line with each code span as one word, so that a stop or a bar in it is none of the text's."""
-    return CODE.sub(lambda m: m[0].translate(HIDDEN), line)
+    """The line with each code span and formula as one word, so that a stop or a bar in it is none of the text's."""
+    return FORMULA.sub(lambda m: m[0].translate(HIDDEN), CODE.sub(lambda m: m[0].translate(HIDDEN), line))
 
 
 def pieces(text):
@@ -122,7 +123,7 @@ def slug(heading):
 
 
 def outside_code(text):
-    """Numbered lines that are not in a code block, code spans taken out."""
+    """Numbered lines that are not in a block of code or formulas, code spans taken out."""
     fenced = False
     for number, line in enumerate(text.splitlines(), 1):
         if FENCE.match(line):

@@ -15,7 +15,8 @@ TWENTY_SIX = "One " + TWENTY_FIVE
 class Pages(unittest.TestCase):
     def test_there_are_pages(self):
         names = {f.relative_to(ROOT).as_posix() for f in check_words.pages()}
-        for name in ("README.md", "fix_solid_cull/fix_solid_cull.md", "region_interface_mesh/region_interface_mesh.md",
+        for name in ("README.md", "fix_solid_cull/fix_solid_cull.md", "fix_solid_cull/theory.md",
+                     "region_interface_mesh/region_interface_mesh.md",
                      "benchmarks/README.md", "examples/impact/README.md", "validation/scale/README.md"):
             self.assertIn(name, names)
 
@@ -59,6 +60,12 @@ class Counter(unittest.TestCase):
 
     def test_a_code_span_is_one_word(self):
         self.assertEqual(self.counts("Put `fix cull all solid/cull. So | there` in."), [3])
+
+    def test_a_formula_is_one_word_and_a_block_of_them_none(self):
+        self.assertEqual(self.counts("The load $|F - F_0| > A m g. So$ wakes it, $x$ m away."), [8])
+        self.assertEqual(self.counts("| $|a| + b$ | c d |\n| --- | --- |\n"), [1, 2])
+        self.assertEqual(self.counts(f"One:\n\n$$\n{TWENTY_SIX}\n$$\n\nTwo three.\n"), [1, 2])
+        self.assertEqual(self.found(f"$$\nx = [a](gone.md)\n$$\n\n{TWENTY_SIX}\n"), [(5, "26 words, 25 at most")])
 
     def test_each_list_item_stands_alone(self):
         self.assertEqual(self.counts("These hold:\n\n- one two\n- three\n  four five\n1. six\n"), [2, 2, 3, 1])

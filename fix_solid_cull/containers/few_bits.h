@@ -1,4 +1,4 @@
-// Numbers in fewer bits than a double has, for granules that wait in a compact store.
+// Numbers in fewer bits than a double has, for granules that wait in a compact store (theory.md#granule-store).
 #pragma once
 
 #include <cmath>

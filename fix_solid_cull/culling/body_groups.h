@@ -1,4 +1,4 @@
-// One body over ranks: parts on several ranks that touch are one rigid body (DESIGN section 12).
+// One body over ranks: parts on several ranks that touch are one rigid body (theory.md#ranks).
 #pragma once
 
 #include <array>

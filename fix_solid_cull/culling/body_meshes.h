@@ -1,4 +1,4 @@
-// Interface meshes of the bodies on this rank, kept once somebody has asked for them (DESIGN section 10).
+// Interface meshes of the bodies on this rank, kept once somebody has asked for them (theory.md#interface-mesh).
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// How solid bodies move, in step with the engine's integrator (DESIGN section 7).
+// How solid bodies move, in step with the engine's integrator (theory.md#body-integrator).
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,5 @@
-// A contact between two granules of one body waits, frozen; it comes back when one of them is free (invariants I3, I5).
+// A contact between two granules of one body waits, frozen; it comes back when one of them is free (theory.md#locking;
+// invariants I3, I5).
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The cover (`exterior live`): how deep a granule lies below the bed's outer surface (DESIGN section 6).
+// The cover (`exterior live`): how deep a granule lies below the bed's outer surface (theory.md#which-granules-are-culled).
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What a body feels as a whole: gravity less its own acceleration, in its own frame (DESIGN section 8).
+// What a body feels as a whole: gravity less its own acceleration, in its own frame (theory.md#effective-gravity).
 #pragma once
 
 #include "bed.h"

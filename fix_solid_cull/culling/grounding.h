@@ -1,5 +1,5 @@
 // Bodies that walls hold: they stand still, so that their granules at walls may go to the store too, and hand on to the walls
-// what presses on them.
+// what presses on them (theory.md#grounding, theory.md#wall-loads).
 #pragma once
 
 #include <set>

@@ -1,4 +1,4 @@
-// The invariants I1 and I2 of the design, checked at run time (debug builds; SOLIDCULL_CHECK in the environment).
+// The invariants I1 and I2 (theory.md#invariants), checked at run time (debug builds; SOLIDCULL_CHECK in the environment).
 #pragma once
 
 #include "bed.h"

@@ -1,4 +1,5 @@
-// One reneighbouring: exterior <-> interface <-> interior. Lives on the stack of Culling::change().
+// One reneighbouring: exterior <-> interface <-> interior (theory.md#restoring says what a granule gets back).
+// Lives on the stack of Culling::change().
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// When to look, when culling waits, and when it is given up for a while (invariant I7).
+// When to look, when culling waits, and when it is given up for a while (theory.md#pacing; invariant I7).
 #pragma once
 
 #include <algorithm>

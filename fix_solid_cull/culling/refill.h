@@ -1,4 +1,4 @@
-// `restore refill`: what comes out of a store that knows no places is packed anew, between what is there.
+// `restore refill`: what comes out of a store that knows no places is packed anew, between what is there (theory.md#refill).
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The shell: interface granules, which are still atoms but locked to their body (DESIGN section 2).
+// The shell: interface granules, which are still atoms but locked to their body (theory.md#locking).
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// The closed shell (invariant I1), both ways: what exterior granules, other bodies or walls come near to becomes an atom again,
-// and shell granules that nothing is near any more go to the store.
+// The closed shell (theory.md#closed-shell; invariant I1), both ways: what exterior granules, other bodies or walls come near to
+// becomes an atom again, and shell granules that nothing is near any more go to the store.
 #pragma once
 
 #include <cstdint>

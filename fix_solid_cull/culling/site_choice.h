@@ -1,4 +1,4 @@
-// `store none`: which site an interface granule takes when it goes to the store.
+// `store none`: which site an interface granule takes when it goes to the store (theory.md#refill).
 #pragma once
 
 #include <functional>

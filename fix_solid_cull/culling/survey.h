@@ -1,4 +1,5 @@
-// Which exterior granules are in solid state (DESIGN section 5), and which of them are to be culled.
+// Which exterior granules are in solid state (theory.md#solid-state), and which of them are to be culled
+// (theory.md#which-granules-are-culled).
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Who asked to wake since the last reneighbouring (DESIGN section 8).
+// Who asked to wake since the last reneighbouring (theory.md#carve).
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// Does culling pay here? Work is counted, in steps of one granule, so that the answer is the same on every machine (I7).
+// Does culling pay here? Work is counted, in steps of one granule, so that the answer is the same on every machine (I7;
+// theory.md#pacing).
 #pragma once
 
 #include <algorithm>

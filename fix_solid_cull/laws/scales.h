@@ -1,4 +1,4 @@
-// The scales of a deck, and the laws measured in them.
+// The scales of a deck, and the laws measured in them (theory.md#scales).
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// The keywords of `fix solid/cull` (DESIGN section 11).
+// The keywords of `fix solid/cull` (theory.md#scales says what they are in SI units).
 #pragma once
 
 #include <string>
@@ -44,7 +44,7 @@ Settings parse_settings(const std::vector<std::string>& words);
 std::vector<std::string> setting_keywords();
 
 /// Steps between looks when the deck names none: a twentieth of sqrt(d/g), in which a granule that starts to fall reaches the
-/// default speed tolerance two and a half times over; at least 10, at most 1000. d in m, g in m/s^2, dt in s.
+/// default speed tolerance two and a half times over; at least 10, at most 1000 (theory.md#scales). d in m, g in m/s^2, dt in s.
 int look_interval(double mean_diameter, double gravity, double dt);
 
 }  // namespace solidcull

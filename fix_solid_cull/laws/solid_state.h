@@ -1,4 +1,4 @@
-// Solid state: a granule and its neighbours move as one rigid piece, in force balance, for long enough (DESIGN section 5).
+// Solid state: a granule and its neighbours move as one rigid piece, in force balance, for long enough (theory.md#solid-state).
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// When an interface granule wakes, and how much of the body it takes along (DESIGN section 8).
+// When an interface granule wakes, and how much of the body it takes along (theory.md#wake-up).
 #pragma once
 
 #include <algorithm>
@@ -38,10 +38,10 @@ struct WakeUpLaw {
   /// Effective gravity (g less the body's acceleration, in the body's frame) against what it was at locking: beyond a share of
   /// |g| the whole body wakes. Direction counts ten times as much as size, for what a packing bears depends on the direction of
   /// its load. A body of a few granules has all of them at its shell, where each one's own load is watched: its share is larger.
-  /// Where gravity itself turns, a tenth of the change in direction is enough.
+  /// Where gravity itself turns, a tenth of the change in direction is enough (theory.md#effective-gravity).
   bool gravity_changed(const Vec3& now, const Vec3& at_locking, double granules, bool turns = false) const;
 
-  /// Radius (m) of the ball that a waking granule carves: r0 (1 + c log2(excess)), at most cap r0. excess >= 1.
+  /// Radius (m) of the ball that a waking granule carves: r0 (1 + c log2(excess)), at most cap r0 (theory.md#carve). excess >= 1.
   double radius(double excess) const;
 
   /// A granule that wakes beside this many others is in a front: a wave passes, or the support of many has gone. Balls around a

@@ -1,4 +1,5 @@
-// Contacts of a granule as words behind its row in an exact store: partners, and histories in fewer bits than they had.
+// Contacts of a granule as words behind its row in an exact store: partners, and histories in fewer bits than they had
+// (theory.md#granule-store).
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // What stored granules press on walls that stand still: frozen when they were put away, so that each mesh element goes on
-// feeling it (DESIGN section 6).
+// feeling it (theory.md#wall-loads).
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The granule store: interior granules, deleted from the engine, their records kept to the last bit (DESIGN section 9).
+// The granule store: interior granules, deleted from the engine, their records kept to the last bit (theory.md#granule-store).
 #pragma once
 
 #include <array>

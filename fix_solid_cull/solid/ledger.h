@@ -1,4 +1,4 @@
-// What went in and out of the store: counts, mass and energy (invariants I2 and I4). Local to the rank.
+// What went in and out of the store: counts, mass and energy (theory.md#restoring; invariants I2 and I4). Local to the rank.
 #pragma once
 
 #include <array>

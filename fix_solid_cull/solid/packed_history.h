@@ -1,4 +1,4 @@
-// A contact history in few bits, for granules that wait in a compact store.
+// A contact history in few bits, for granules that wait in a compact store (theory.md#granule-store).
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Free and forced motion of one rigid body, in step with the engine's velocity-Verlet integrator (DESIGN section 7).
+// Free and forced motion of one rigid body, in step with the engine's velocity-Verlet integrator (theory.md#body-integrator).
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,5 @@
-// Where granules of which no place is kept may be: the sites of a random packing, relaxed once and repeated through space.
+// Where granules of which no place is kept may be: the sites of a random packing, relaxed once and repeated through space
+// (theory.md#refill).
 #pragma once
 
 #include <array>

@@ -1,4 +1,5 @@
-// Solid bodies: connected groups of locked granules, each one rigid body with its granules' mass properties (DESIGN section 7).
+// Solid bodies: connected groups of locked granules, each one rigid body with its granules' mass properties
+// (theory.md#solid-bodies).
 #pragma once
 
 #include <Eigen/Core>
@@ -59,7 +60,7 @@ struct SolidBody {
   bool spanned = false;         ///< a part of a body over several ranks when its motion was last settled
   std::array<bool, 3> spans{};  ///< tied to its own periodic image in these directions
   std::int64_t summed = 0;      ///< count when the sums were last made from scratch
-  // wake-up (DESIGN section 8)
+  // what it feels (theory.md#effective-gravity)
   Vec3 felt = Vec3::Zero();  ///< effective gravity at locking, frame of the body (m/s^2)
   bool felt_known = false;
   Vec3 velocity_then = Vec3::Zero();  ///< of the centre, when the window of the mean acceleration began (m/s)
@@ -115,7 +116,7 @@ struct SolidBody {
   /// A body of one granule, which stands at this place of the world: its frame becomes the world's.
   void reframe_one(const GranuleMass& in_world);
 
-  // one time step (velocity-Verlet, DESIGN section 7)
+  // one time step (theory.md#body-integrator)
   void kick(const Vec3& force, const Vec3& torque, double dt) { motion.kick(force, torque, dt); }
   void drift(double dt) { pose.advance(motion.drift(dt)); }
   void shift(const Vec3& by) {  ///< to another periodic image
@@ -135,7 +136,7 @@ struct SolidBody {
   /// image to the one in which the parts are given.
   void settle_as_part(const std::vector<RigidPart>& parts, const FreeAxes& free, const Vec3& shift, double grounded_share);
 
-  // effective gravity (DESIGN section 8)
+  // effective gravity (theory.md#effective-gravity)
   void feel(const Vec3& gravity_in_frame) {
     felt = gravity_in_frame;
     felt_known = true;

@@ -1,4 +1,5 @@
-// Spheres that overlap are moved off each other (a packing relaxed by projecting overlaps away, as position-based dynamics does).
+// Spheres that overlap are moved off each other (a packing relaxed by projecting overlaps away, as position-based dynamics does;
+// theory.md#refill).
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Where a rigid body is: its own frame, seen from the world.
+// Where a rigid body is: its own frame, seen from the world (theory.md#frames-and-signs).
 #pragma once
 
 #include <Eigen/Geometry>
