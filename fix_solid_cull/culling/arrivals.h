@@ -1,25 +1,74 @@
-// Interface granules on their way from another rank, and those that never came.
+// Interface granules on their way from another rank.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "flat_map.h"
-#include "solid_bodies.h"
+#include "solid.h"
 
 namespace solidcull {
 
-/// An interface granule that another rank has announced in this reneighbouring; the engine brings its atom.
+/// One that another rank has announced in this reneighbouring; the engine brings its atom.
 struct Arrival {
   SolidBodies::Place at;
   double mass = 0, radius = 0;
   bool held = false;
 };
-using Arrivals = FlatMap<Arrival>;
 
 /// One that the engine does not have any more, and its body has still; in the frame of that.
 struct LostGranule {
   std::int64_t tag;
   GranuleMass granule;
+};
+
+/// Local.
+class Arrivals {
+ public:
+  void announce(std::int64_t tag, const Arrival& a) { announced_[tag] = a; }
+  const Arrival* find(std::int64_t tag) const { return announced_.find(tag); }
+  template <class Visit>
+  void for_each_tag(Visit visit) const {
+    announced_.for_each([&](std::int64_t tag, const Arrival&) { visit(tag); });
+  }
+  /// It has come. InternalError for one that was not announced.
+  Arrival take(std::int64_t tag) {
+    const Arrival* a = announced_.find(tag);
+    if (!a) throw InternalError("interface granule " + std::to_string(tag) + " came from another rank without its body");
+    const Arrival taken = *a;
+    announced_.erase(tag);
+    return taken;
+  }
+  /// Those that have not come, by tag; none is announced afterwards.
+  std::vector<LostGranule> take_missing() {
+    std::vector<LostGranule> lost;
+    announced_.for_each([&](std::int64_t tag, const Arrival& a) {
+      lost.push_back({tag, {a.mass, a.at.position, a.radius, a.held}});
+    });
+    std::sort(lost.begin(), lost.end(), [](const LostGranule& a, const LostGranule& b) { return a.tag < b.tag; });
+    clear();
+    return lost;
+  }
+  /// Bodies have merged: they will stand in the frames of those that they are part of now.
+  void adopt_places(Solid& solid) {
+    const SolidBodies& bodies = solid.bodies();
+    FlatMap<Arrival> moved;
+    announced_.for_each([&](std::int64_t tag, Arrival a) {
+      const int body = bodies.body_of(tag);
+      const Pose &from = bodies.pose(a.at.body), &to = bodies.pose(body);
+      if (from != to) a.at.position = to.to_frame(from.to_world(a.at.position));
+      if (a.at.body != body) solid.stands(body, {a.at.position, a.radius});
+      a.at.body = body;
+      moved[tag] = a;
+    });
+    announced_ = std::move(moved);
+  }
+  void clear() { announced_.clear(); }
+
+ private:
+  FlatMap<Arrival> announced_;
 };
 
 }  // namespace solidcull

@@ -1,20 +1,17 @@
 #include "bed.h"
 
-#include <utility>
-
 namespace solidcull {
 
 Bed::Bed(const Ports& engine, const Settings& settings, int types)
     : BedState(engine, settings), stored(*this), masses(*this), groups(*this, stored, masses), census(*this) {
   solid.set_types(types);
+  solid.followed_by(*this);
 }
 
-void Bed::split_bodies() {
-  solid.split(masses.by_tag(), [&](std::int64_t tag, int body, const Vec3& place) {
-    const int i = index.at(tag);
-    solid.stands(shell[i].body, {shell[i].place, atoms.radius[i]});
-    shell.stands(i, {body, place});
-  });
+void Bed::came_off(std::int64_t tag, int body, const Vec3& place) {
+  const int i = index.at(tag);
+  solid.stands(shell[i].body, {shell[i].place, atoms.radius[i]});
+  shell.stands(i, {body, place});
 }
 
 void Bed::adopt_places() {
@@ -31,16 +28,7 @@ void Bed::adopt_places() {
     shell.set_body(i, body);
     solid.stands(body, {shell[i].place, atoms.radius[i]});
   }
-  Arrivals moved;
-  arrivals.for_each([&](std::int64_t tag, Arrival a) {
-    const int body = bodies.body_of(tag);
-    const Pose &from = bodies.pose(a.at.body), &to = bodies.pose(body);
-    if (from != to) a.at.position = to.to_frame(from.to_world(a.at.position));
-    if (a.at.body != body) solid.stands(body, {a.at.position, a.radius});
-    a.at.body = body;
-    moved[tag] = a;
-  });
-  arrivals = std::move(moved);
+  arrivals.adopt_places(solid);
   solid.adopt_swallowed();
 }
 

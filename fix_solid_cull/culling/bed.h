@@ -1,6 +1,8 @@
 // The bed: its state, and what is asked of it again and again. Most parts of the culling hold this and little else.
 #pragma once
 
+#include <cstdint>
+
 #include "bed_state.h"
 #include "body_groups.h"
 #include "census.h"
@@ -9,11 +11,13 @@
 
 namespace solidcull {
 
-struct Bed : BedState {
+/// Interface granules follow their bodies.
+struct Bed : BedState, BodyFollower {
   Bed(const Ports& engine, const Settings& settings, int types);
 
-  /// After granules were unlocked: bodies that came apart become several; interface granules follow. Local.
-  void split_bodies();
+  /// After granules were unlocked: bodies that came apart become several. Local.
+  void split_bodies() { solid.split(masses.by_tag()); }
+  void came_off(std::int64_t tag, int body, const Vec3& place) override;
   /// After bodies merged: granules of swallowed ones move to the frames of the bodies that they are part of now: interface
   /// granules, those that are to arrive, interior ones. Local.
   void adopt_places();

@@ -48,6 +48,7 @@ std::vector<std::int64_t> BodyGroups::stored_at_borders() const {
 }
 
 void BodyGroups::group() {
+  bed_.solid.tell_settled();
   groups_.clear();
   spanning_.clear();
   tied_.clear();
@@ -73,7 +74,7 @@ void BodyGroups::group() {
   for (int i = 0; i < bed_.atoms.owned; ++i)
     if (bed_.shell[i].locked) reaches_out(bed_.atoms.tag[i]);
   for (const std::int64_t tag : stored_at_borders()) reaches_out(tag);
-  bed_.arrivals.for_each([&](std::int64_t tag, const Arrival&) { reaches_out(tag); });
+  bed_.arrivals.for_each_tag(reaches_out);
   ends = bed_.ranks.gather(ends);
   struct Link {
     int parent;

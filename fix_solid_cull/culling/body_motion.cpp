@@ -18,8 +18,9 @@ bool moves_by_numbers(const SolidBody& b) {
 }  // namespace
 
 void BodyMotion::refresh() {
-  if (!stale_) return;
+  if (!stale()) return;
   stale_ = false;
+  listed_ = bed_.shell.version();
   active_.clear();
   atoms_.clear();
   slot_.clear();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "bed.h"
@@ -33,10 +34,15 @@ class BodyMotion : public BodyFollower {
   /// Largest load change over tolerance in this step, on this rank.
   double largest_excess() const { return largest_excess_; }
 
-  /// Atoms or bodies are others: what was listed is to be listed anew. Local.
-  void is_stale() { stale_ = true; }
-  bool stale() const { return stale_; }
-  void grounded_or_let_go(int) override { is_stale(); }
+  /// The engine has searched for neighbours: what is near what is known, wherever bodies have been since the last time. Local.
+  void begin_lists() { stale_ = true; }
+  /// Whether bodies or their atoms are others since they were listed. Local.
+  bool stale() const { return stale_ || listed_ != bed_.shell.version(); }
+  void merged(int, int, bool) override { stale_ = true; }
+  void settled() override { stale_ = true; }
+  void grounded_or_let_go(int) override { stale_ = true; }
+  void frame_changed(int) override { stale_ = true; }
+  void forgotten(int) override { stale_ = true; }
   /// Lists active bodies and their atoms, if they are stale. Local.
   void refresh();
   /// The same in the middle of a time step, between the loads and the second half of the kick: bodies that go on moving keep the
@@ -59,6 +65,9 @@ class BodyMotion : public BodyFollower {
   /// Whether a stored granule may have gone so far that something unseen is near: within so many steps from now. Local.
   bool comes_too_far(int steps) const;
   bool is_fast(int steps) const;
+  /// Whether ranks ask each other in each step if a body has come too far: one was fast when they talked last. Local.
+  void watch(bool on) { watched_ = on; }
+  bool is_watched() const { return watched_; }
 
   void release_memory();
 
@@ -77,7 +86,8 @@ class BodyMotion : public BodyFollower {
   std::vector<std::size_t> slot_;    // their bodies in active_
   std::vector<Vec3> place_;          // and places there
   std::vector<std::size_t> riding_;  // those of them whose bodies move
-  bool stale_ = true;
+  bool stale_ = true, watched_ = false;
+  std::uint64_t listed_ = 0;  // version of the shell then
   double largest_excess_ = 0;
 };
 

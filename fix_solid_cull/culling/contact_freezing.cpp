@@ -92,6 +92,14 @@ void ContactFreezing::freeze_between_merged() {
   }
 }
 
+void ContactFreezing::leave_out_inner_pairs() {
+  inner_pairs_listed_ = false;
+  if (!bed_.census.something_locked()) return;
+  std::vector<int> body(static_cast<std::size_t>(bed_.atoms.owned + bed_.atoms.ghosts));
+  for (std::size_t i = 0; i < body.size(); ++i) body[i] = bed_.groups.key_of_atom(static_cast<int>(i));
+  bed_.contacts.leave_out_pairs_within(body);
+}
+
 void ContactFreezing::thaw(const Changes& changes) {
   std::vector<std::int64_t> freed;  // in the order of their tags: neighbours lie near each other in memory then
   freed.reserve(changes.freed_anywhere.size());

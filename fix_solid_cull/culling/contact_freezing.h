@@ -35,6 +35,12 @@ class ContactFreezing {
   /// granule that stays. What contacts hold that were made anew by `restore refill` is energy added.
   void rebase_thawed();
 
+  /// The engine has searched for neighbours: pairs within bodies stand in its lists.
+  void lists_are_new() { inner_pairs_listed_ = true; }
+  bool inner_pairs_listed() const { return inner_pairs_listed_; }
+  /// They leave the lists.
+  void leave_out_inner_pairs();
+
  private:
   using TagPairs = std::set<std::pair<std::int64_t, std::int64_t>>;
   static std::pair<std::int64_t, std::int64_t> ordered(std::int64_t a, std::int64_t b) {
@@ -47,6 +53,7 @@ class ContactFreezing {
   void count_energy_of_new_contacts() const;
 
   Bed& bed_;
+  bool inner_pairs_listed_ = false;
   FlatMap<char> thawed_;  // granules that were freed in the last change, here or near
   TagPairs kept_;         // with `restore refill`: contacts of theirs that have a history, lower tag first
 };

@@ -14,6 +14,7 @@
 #include "implicit_surface.h"
 #include "per_granule.h"
 #include "sphere_cells.h"
+#include "store_exchange.h"
 #include "wake_requests.h"
 
 namespace solidcull {
@@ -39,13 +40,15 @@ struct Drawn {
 
 /// The surface is drawn in the frame of an observer who rides on the largest body, so that a mass that falls or turns as one
 /// leaves it as it is. Walls are no surface (`walls closed`): plugs behind them close it. m.
-class Cover : public BodyFollower {
+class Cover : public BodyFollower, public StoreFollower {
  public:
   Cover(const Bed& bed, const BodyMotion& motion, WakeRequests& wake) : bed_(bed), motion_(motion), wake_(wake) {}
 
   PerGranule<Drawn>& rows() { return rows_; }
   /// The surface does not care who holds a granule: it has come out of the store.
-  void came_back(int i, const Vec3& x) { rows_[i] = {true, observer_.to_frame(x), Voxel::nothing()}; }
+  void came_back(int i, const StoredGranule&, const Vec3& x) override {
+    rows_[i] = {true, observer_.to_frame(x), Voxel::nothing()};
+  }
   /// Out of a restart file: the surface is drawn anew.
   void forget(int i) { rows_[i].drawn = false; }
 

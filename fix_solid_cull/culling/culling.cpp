@@ -1,5 +1,5 @@
-// The pipelines of a run's beginning, of a step, and between runs; looks and membership changes have files of their own. Each
-// step of a pipeline has its own class.
+// The pipelines of a run's beginning and of a step; looks, membership changes and what happens between runs have classes of their
+// own, and so has each step of a pipeline.
 #include "culling.h"
 
 #include <algorithm>
@@ -9,7 +9,6 @@
 
 #include "input_error.h"
 #include "numbers.h"
-#include "word_sum.h"
 
 namespace solidcull {
 namespace {
@@ -28,21 +27,21 @@ void Culling::expect(std::initializer_list<Phase> phases, const char* where) con
 // ------------------------------------------------------------------------------------------------------------ a run begins
 
 void Culling::begin_run() {
-  const std::vector<bool> flips = p_.bed.contacts.flips();
-  if (!p_.bed.solid.set_histories(flips, p_.bed.contacts.vectors()))
-    throw InputError("the contact model's history has changed from " + std::to_string(p_.bed.solid.contacts().width()) + " to " +
-                     std::to_string(flips.size()) + " numbers while granules are culled: unfix " + p_.bed.run.name +
+  const std::vector<bool> flips = bed_.contacts.flips();
+  if (!bed_.solid.set_histories(flips, bed_.contacts.vectors()))
+    throw InputError("the contact model's history has changed from " + std::to_string(bed_.solid.contacts().width()) + " to " +
+                     std::to_string(flips.size()) + " numbers while granules are culled: unfix " + bed_.run.name +
                      " before the pair_style changes");
-  if (!p_.bed.solid.set_granules_turn(p_.bed.contacts.turn_granules))
+  if (!bed_.solid.set_granules_turn(bed_.contacts.turn_granules))
     throw InputError(
         "the contact model has, or had, neither friction nor rolling friction, and changes while granules are culled: "
         "unfix " +
-        p_.bed.run.name + " before the pair_style changes");
-  p_.bed.ranks.update();
-  Vec3 periods = p_.bed.run.edges();
+        bed_.run.name + " before the pair_style changes");
+  bed_.ranks.update();
+  Vec3 periods = bed_.run.edges();
   for (int d = 0; d < 3; ++d)
-    if (!p_.bed.run.periodic[d]) periods[d] = 0;
-  p_.bed.solid.set_periods(periods);
+    if (!bed_.run.periodic[d]) periods[d] = 0;
+  bed_.solid.set_periods(periods);
   p_.report.membership_changed();  // the deck may have made granules, or deleted some
   p_.files.begin_run();
   phase_ = Phase::beginning;
@@ -50,73 +49,72 @@ void Culling::begin_run() {
 
 void Culling::refuse_what_lies_too_far() const {
   // twice the way to the farthest corner: places wait in the frames of bodies that may have moved through the box
-  const Vec3 corner = p_.bed.run.box.lo.cwiseAbs().cwiseMax(p_.bed.run.box.hi.cwiseAbs());
-  const double far = 2 * corner.norm(), d = p_.bed.scales.diameter();
-  const double farthest = p_.bed.scales.compact() ? GranuleStore::farthest * 2 * d : Sites(d).farthest();
+  const Vec3 corner = bed_.run.box.lo.cwiseAbs().cwiseMax(bed_.run.box.hi.cwiseAbs());
+  const double far = 2 * corner.norm(), d = bed_.scales.diameter();
+  const double farthest = bed_.scales.compact() ? GranuleStore::farthest * 2 * d : Sites(d).farthest();
   if (far <= farthest) return;
   char told[64];
   std::snprintf(told, sizeof told, "%.4g m from the origin, and the box reaches %.4g m", farthest / 2, far / 2);
-  throw InputError("store " + std::string(p_.bed.scales.compact() ? "compact keeps places" : "none has sites") + " up to " +
+  throw InputError("store " + std::string(bed_.scales.compact() ? "compact keeps places" : "none has sites") + " up to " +
                    std::string(told) + ": move the origin to the granules, or use store exact");
 }
 
 void Culling::find_scales() {
-  double diameter = p_.bed.scales.diameter(), gravity = p_.bed.scales.gravity();
+  double diameter = bed_.scales.diameter(), gravity = bed_.scales.gravity();
   if (diameter == 0) {
     double sums[2] = {0, 0};
-    const Atoms& atoms = p_.bed.atoms;
+    const Atoms& atoms = bed_.atoms;
     for (int i = 0; i < atoms.owned; ++i)
       if (atoms.groups[i] & atoms.own_bit) {
         sums[0] += 2 * atoms.radius[i];
         sums[1] += 1;
       }
-    p_.bed.ranks.sum(sums, 2);
+    bed_.ranks.sum(sums, 2);
     if (sums[1] > 0) diameter = sums[0] / sums[1];
   }
-  const double g = p_.bed.run.gravity().norm();
+  const double g = bed_.run.gravity().norm();
   if (g > 0) gravity = g;
   if (gravity == 0) {
     gravity = Scales::standard_gravity;
-    p_.bed.run.say("the deck has no fix gravity; 'speed' and 'tolerance' are measured with 9.81 m/s^2");
+    bed_.run.say("the deck has no fix gravity; 'speed' and 'tolerance' are measured with 9.81 m/s^2");
   }
-  p_.bed.scales.set(diameter, gravity);
+  bed_.scales.set(diameter, gravity);
   if (diameter == 0) return;  // an empty box: the first granules set the scale
-  p_.bed.scales.make_laws(p_.bed.run.dt);
-  if (p_.bed.solid.has_store()) return;
-  if (p_.bed.scales.image_by_place()) refuse_what_lies_too_far();
-  p_.bed.solid.open_store();
-  if (Invariants::asked()) p_.bed.solid.pack_contacts_from(0);  // so that small scenes try it too
+  bed_.scales.make_laws(bed_.run.dt);
+  if (bed_.solid.has_store()) return;
+  if (bed_.scales.image_by_place()) refuse_what_lies_too_far();
+  bed_.solid.open_store();
+  if (Invariants::asked()) bed_.solid.pack_contacts_from(0);  // so that small scenes try it too
 }
 
 void Culling::set_up_atoms() {
   expect({Phase::beginning}, "set_up_atoms");
   if (p_.shown.shown()) return;  // no run: a command of the deck sets up what it needs
-  check_numbers(p_.bed.atoms);
+  check_numbers(bed_.atoms);
   find_scales();
-  if (!p_.bed.solid.has_store()) return;
+  if (!bed_.solid.has_store()) return;
   // a restart file keeps groups: marks of granules that this fix does not hold would hide their contacts
-  for (int i = 0; i < p_.bed.atoms.owned; ++i)
-    if (!p_.bed.shell[i].locked) p_.bed.atoms.mark_interface(i, false);
+  for (int i = 0; i < bed_.atoms.owned; ++i)
+    if (!bed_.shell[i].locked) bed_.atoms.mark_interface(i, false);
   if (p_.snapshot.waits()) {
     p_.snapshot.take_up();
-    count_restored();
+    change_.count_restored();
     // this deck may hold or drive what the one before did not
     p_.exchange.set_stored_groups(p_.claims.wake_claimed());
   }
   const bool other_walls = p_.walls.walls_are_others();
-  if (other_walls) granules_may_change();
-  take_changes(other_walls);
+  if (other_walls) look_.granules_may_change();
+  between_.take_changes(other_walls);
   p_.closure.begin_run(other_walls);
   change();
-  p_.closure.run_has_begun();
-  walls_are_felt_ = !other_walls;
+  p_.closure.run_begun();
 }
 
 void Culling::is_set_up() {
   expect({Phase::beginning}, "is_set_up");
   // other fixes add their forces later: the loads are taken at the start of the first step
   phase_ = Phase::ready;
-  if (p_.bed.solid.has_store()) p_.files.write_due();  // as the engine's dumps show where a run begins
+  if (bed_.solid.has_store()) p_.files.write_due();  // as the engine's dumps show where a run begins
 }
 
 void Culling::initial_step() {
@@ -124,74 +122,49 @@ void Culling::initial_step() {
   expect({Phase::ready, Phase::stepping, Phase::between_runs}, "initial_step");
   const bool first = phase_ == Phase::ready;
   phase_ = Phase::stepping;
-  if (!first || !p_.bed.solid.has_store()) return;
+  if (!first || !bed_.solid.has_store()) return;
   take_loads();
   p_.gravity.begin_run();
-  see_walls(true);
-  open_for_insertion(p_.bed.run.step);
-  const std::int64_t step = p_.bed.run.step;
-  if (p_.bed.ranks.any(p_.wake.any_here())) ask_for_build(step);
-  p_.pacing.begin_run(step, p_.bed.census.something_locked());
-  if (p_.pacing.looks_at_once()) look_at_once();
-  if (p_.bed.ranks.any(proposal_dropped_)) p_.pacing.look_earlier(step);
-  proposal_dropped_ = false;
+  look_.see_walls(true);
+  open_for_insertion(bed_.run.step);
+  const std::int64_t step = bed_.run.step;
+  if (bed_.ranks.any(p_.wake.any_here())) p_.ask_for_build(step);
+  p_.pacing.begin_run(step, bed_.census.something_locked());
+  if (p_.pacing.looks_at_once()) look_.look_at_once();
+  if (bed_.ranks.any(look_.take_dropped())) p_.pacing.look_earlier(step);
 }
 
 // ------------------------------------------------------------------------------------------------------------ a time step
 
 void Culling::integrate() {
   expect({Phase::stepping}, "integrate");
-  if (!p_.bed.solid.has_store() || !p_.bed.scales.rigid() || (p_.bed.ranks.count == 1 && p_.motion.active().empty())) return;
+  if (!bed_.solid.has_store() || !bed_.scales.rigid() || (bed_.ranks.count == 1 && p_.motion.active().empty())) return;
   const auto timed = p_.report.time(Part::load);
   p_.motion.kick_and_drift();
   p_.motion.place();
   // the engine looks at its atoms only: a body that has none would come near something unseen
-  if ((p_.bed.ranks.count == 1 || bodies_are_fast_) && p_.bed.ranks.any(p_.motion.comes_too_far(0)))
-    p_.bed.run.ask_for_reneighbouring(p_.bed.run.step);
+  if ((bed_.ranks.count == 1 || p_.motion.is_watched()) && bed_.ranks.any(p_.motion.comes_too_far(0)))
+    bed_.run.ask_for_reneighbouring(bed_.run.step);
 }
 
 void Culling::take_neighbours() {
-  p_.motion.is_stale();
+  p_.motion.begin_lists();
   lists_are_new();
-  if (!p_.bed.solid.has_store()) return;
-  if (p_.bed.census.something_locked())
-    take_arrivals();
+  if (!bed_.solid.has_store()) return;
+  if (bed_.census.something_locked())
+    change_.take_arrivals();
   else
-    p_.bed.groups.forget_ghosts();
+    bed_.groups.forget_ghosts();
   // the box followed the granules: stored ones go to the rank that has their place now, before anything comes near them
-  if (p_.bed.census.something_stored() && p_.bed.ranks.any(p_.bed.ranks.subdomain_changed()))
-    p_.bed.run.ask_for_reneighbouring(p_.bed.run.step + 1);
+  if (bed_.census.something_stored() && bed_.ranks.any(bed_.ranks.subdomain_changed()))
+    bed_.run.ask_for_reneighbouring(bed_.run.step + 1);
   if (Invariants::asked()) p_.invariants.check();
-}
-
-/// Interface granules may have come from other ranks, or left the box.
-void Culling::take_arrivals() {
-  p_.lost.add(p_.handover.take_over());
-  if (p_.lost.forget_lost()) settle_bodies();
-  p_.bed.groups.share();
-}
-
-void Culling::settle_bodies() {
-  p_.bed.groups.settle();
-  p_.bed.census.count_bodies();
-  p_.bed.label_bodies();
-  p_.motion.is_stale();
-}
-
-void Culling::leave_out_inner_pairs() {
-  if (!inner_pairs_listed_) return;
-  inner_pairs_listed_ = false;
-  if (!p_.bed.census.something_locked()) return;
-  const auto timed = p_.report.time(Part::load);
-  std::vector<int> body(static_cast<std::size_t>(p_.bed.atoms.owned + p_.bed.atoms.ghosts));
-  for (std::size_t i = 0; i < body.size(); ++i) body[i] = p_.bed.groups.key_of_atom(static_cast<int>(i));
-  p_.bed.contacts.leave_out_pairs_within(body);
 }
 
 /// A granule that goes to the store takes its loads on walls along: before that it is locked, or was chosen by a look.
 bool Culling::may_ask_for_wall_loads() const {
   if (phase_ != Phase::stepping) return true;
-  return p_.bed.scales.sleeping() && (p_.bed.census.something_locked() || proposal_.any_here() || p_.pacing.due(p_.bed.run.step));
+  return bed_.scales.sleeping() && (bed_.census.something_locked() || look_.chosen().any_here() || p_.pacing.due(bed_.run.step));
 }
 
 void Culling::take_loads() {
@@ -199,24 +172,24 @@ void Culling::take_loads() {
   p_.motion.refresh();
   p_.freezing.rebase_thawed();
   p_.motion.take_loads();
-  if (p_.bed.scales.sleeping()) p_.grounding.press_on_walls();
+  if (bed_.scales.sleeping()) p_.grounding.press_on_walls();
 }
 
 void Culling::take_forces() {
   expect({Phase::stepping}, "take_forces");
-  const std::int64_t step = p_.bed.run.step;
-  if (!p_.bed.solid.has_store()) {  // the run started with an empty box: the first granules that are poured set the scales
+  const std::int64_t step = bed_.run.step;
+  if (!bed_.solid.has_store()) {  // the run started with an empty box: the first granules that are poured set the scales
     if (step % first_granules_every == 0) find_scales();
-    if (!p_.bed.solid.has_store()) return;
+    if (!bed_.solid.has_store()) return;
     p_.pacing.begin_within_run(step);
   }
-  if (p_.bed.census.something_locked() || !loads_are_none_) take_loads();
-  loads_are_none_ = !p_.bed.census.something_locked();
+  if (bed_.census.something_locked() || !loads_are_none_) take_loads();
+  loads_are_none_ = !bed_.census.something_locked();
   store_what_feels_walls();
   collect_wakes();
   if (p_.pacing.due(step)) {
-    look();
-    if (p_.bed.ranks.any(p_.wake.any_here())) ask_for_build(step + 1);
+    look_.look();
+    if (bed_.ranks.any(p_.wake.any_here())) p_.ask_for_build(step + 1);
   }
   open_for_insertion(step + 1);
 }
@@ -224,36 +197,35 @@ void Culling::take_forces() {
 /// What came out of the store because walls may be others feels them now, and goes back: there may be very many, and a look is
 /// some steps away.
 void Culling::store_what_feels_walls() {
-  if (walls_are_felt_) return;
-  walls_are_felt_ = true;
-  const bool asked = p_.bed.scales.sleeping() && p_.closure.ask_to_store(p_.motion.interface_atoms());
-  if (p_.bed.ranks.any(asked)) ask_for_build(p_.bed.run.step + 1);
+  if (!p_.closure.take_walls_unfelt()) return;
+  const bool asked = bed_.scales.sleeping() && p_.closure.ask_to_store(p_.motion.interface_atoms());
+  if (bed_.ranks.any(asked)) p_.ask_for_build(bed_.run.step + 1);
 }
 
 /// Gentle loads wait for each other; a blow does not.
 void Culling::collect_wakes() {
-  if (!p_.bed.census.something_locked()) return;
-  const Ranks& ranks = p_.bed.ranks;
+  if (!bed_.census.something_locked()) return;
+  const Ranks& ranks = bed_.ranks;
   const int period = p_.pacing.wake_period();
   const bool blow = p_.motion.largest_excess() > Pacing::blow;
-  if (!p_.pacing.wakes_now(p_.bed.run.step) && !ranks.any(blow)) return;
+  if (!p_.pacing.wakes_now(bed_.run.step) && !ranks.any(blow)) return;
   bool waking = false;
   for (const int i : p_.motion.interface_atoms()) {
-    const double excess = p_.bed.shell.take_excess(i);
+    const double excess = bed_.shell.take_excess(i);
     if (excess <= 1) continue;
-    p_.wake.ask_by_load(p_.bed.atoms.place(i), p_.bed.scales.wake_up().radius(excess));
+    p_.wake.ask_by_load(bed_.atoms.place(i), bed_.scales.wake_up().radius(excess));
     waking = true;
   }
-  const bool rigid = p_.bed.scales.rigid();
+  const bool rigid = bed_.scales.rigid();
   std::int64_t asked[2] = {waking || (rigid && p_.motion.comes_too_far(period + 1)), rigid && p_.motion.is_fast(period + 1)};
   ranks.largest(asked, 2);
-  if (asked[0]) ask_for_build(p_.bed.run.step + 1);
-  bodies_are_fast_ = asked[1] != 0;
+  if (asked[0]) p_.ask_for_build(bed_.run.step + 1);
+  p_.motion.watch(asked[1] != 0);
 }
 
 void Culling::finish_step() {
   expect({Phase::stepping}, "finish_step");
-  if (!p_.bed.solid.has_store() || !p_.bed.scales.rigid() || p_.motion.active().empty()) return;
+  if (!bed_.solid.has_store() || !bed_.scales.rigid() || p_.motion.active().empty()) return;
   const auto timed = p_.report.time(Part::load);
   p_.motion.kick();
   p_.motion.give_velocities_to_riders();
@@ -261,109 +233,13 @@ void Culling::finish_step() {
 
 void Culling::write_outputs() {
   expect({Phase::stepping}, "write_outputs");
-  if (p_.bed.solid.has_store()) p_.files.write_due();
+  if (bed_.solid.has_store()) p_.files.write_due();
 }
 
 void Culling::end_run() {
   p_.walls.remember_walls();
-  if (p_.bed.solid.has_store()) p_.report.tell_run();
+  if (bed_.solid.has_store()) p_.report.tell_run();
   if (phase_ == Phase::stepping) phase_ = Phase::between_runs;  // after `run 0` the first step is still to come, if `pre no`
-}
-
-/// The only place where the rebuilds that this fix asks for are counted.
-void Culling::ask_for_build(std::int64_t step) {
-  if (p_.bed.run.ask_for_reneighbouring(step)) p_.pacing.count_build();
-}
-
-// ------------------------------------------------------------------------------------------------------------ between runs
-
-/// Atoms come and go now: neighbour lists, which name them by their indices, and ghosts are void until the next run sets up.
-void Culling::leave_lists() {
-  p_.bed.contacts.bring_histories_up_to_date();
-  p_.bed.contacts.forget_neighbours();
-  p_.bed.atoms.drop_ghosts();
-}
-
-void Culling::show_bed() {
-  if (!p_.bed.solid.has_store() || !p_.bed.census.something_locked() || p_.shown.shown()) return;
-  leave_lists();
-  p_.lost.remember();
-  p_.shown.show();
-  p_.bed.atoms.count_more(p_.bed.census.stored());
-  show_unfinished_ = true;
-}
-
-void Culling::finish_show() {
-  if (!show_unfinished_) return;
-  show_unfinished_ = false;
-  p_.bed.ranks.update();
-  p_.bed.atoms.publish_counts(0);
-}
-
-void Culling::lend_contacts() {
-  p_.bed.memory.give_bins_back();
-  p_.shown.give_contacts();
-}
-
-void Culling::take_contacts_back() {
-  leave_lists();
-  p_.shown.take_contacts();
-  p_.bed.atoms.publish_counts(0);
-}
-
-void Culling::granules_may_change() {
-  proposal_dropped_ = proposal_dropped_ || proposal_.any_here();
-  proposal_ = {};
-}
-
-std::uint64_t Culling::sum_of_granules() const {
-  WordSum sum;
-  const Atoms& atoms = p_.bed.atoms;
-  for (int i = 0; i < atoms.owned; ++i) {
-    for (const Vec3& v : {atoms.place(i), atoms.velocity(i), atoms.spin(i)})
-      for (int d = 0; d < 3; ++d) sum.add(v[d]);
-    for (const double x : {atoms.radius[i], atoms.mass[i], double(atoms.type[i]), double(atoms.groups[i])}) sum.add(x);
-  }
-  return sum.value();
-}
-
-void Culling::remember_granules() {
-  if (proposal_.any_here()) granules_sum_ = sum_of_granules();
-}
-
-void Culling::see_granules_again() {
-  if (proposal_.any_here() && granules_sum_ != sum_of_granules()) granules_may_change();
-}
-
-bool Culling::culls_of(int groups) const {
-  if (!p_.bed.census.something_locked()) return false;
-  int culled = p_.shown.shown() ? ~0 : p_.exchange.stored_groups();
-  const Atoms& atoms = p_.bed.atoms;
-  for (int i = 0; i < atoms.owned; ++i)
-    if (p_.bed.shell.locked(i)) culled |= atoms.groups[i];
-  return p_.bed.ranks.any((culled & groups) != 0);
-}
-
-void Culling::hide_bed() {
-  if (!p_.shown.shown()) return;
-  finish_show();
-  hide_guests();
-  p_.bed.atoms.publish_counts(-p_.bed.census.stored());
-}
-
-void Culling::hide_guests() {
-  p_.shown.hide();
-  p_.exchange.set_stored_groups(p_.shown.groups_of_guests());
-}
-
-/// What the deck did to culled granules between runs.
-void Culling::take_changes(bool other_walls) {
-  if (!p_.shown.changed()) return;
-  if (p_.lost.forget_lost()) settle_bodies();
-  p_.closure.begin_run(other_walls);
-  change();
-  p_.shown.give_changes();
-  take_arrivals();
 }
 
 // ------------------------------------------------------------------------------------------------------------ insertion
@@ -371,61 +247,27 @@ void Culling::take_changes(bool other_walls) {
 /// Fixes that insert check for overlap with atoms only: where they put granules, stored ones become atoms in the change at this
 /// step, the one before, so that ranks see each other's.
 void Culling::open_for_insertion(std::int64_t step) {
-  if (p_.bed.census.something_stored() && p_.bed.insertions.any_due(step + 1 + p_.bed.run.reset_by))
-    p_.bed.run.ask_for_reneighbouring(step);
-}
-
-/// What was made inside a stored granule cannot stay. Stored ones come back for each fix that inserts, so nothing that LIGGGHTS
-/// does is known to come here; but between runs a deck may make granules anywhere, and fixes need not look for overlap. What was
-/// culled there wakes before the first force: a blow is shared by two. Before anything comes out of the store.
-void Culling::meet_new_granules() {
-  if (p_.bed.census.something_locked()) {
-    const ShellClosure::Overlapped found = p_.closure.by_new_granules();
-    if (found.in_stored && phase_ == Phase::stepping)
-      throw InputError("granule " + std::to_string(found.in_stored) +
-                       " was inserted into the place of a culled one: give the insertion a region above the bed, or unfix " +
-                       p_.bed.run.name + " first");
-    for (const Vec3& place : found.places) p_.wake.ask(place, p_.bed.scales.wake_up().radius(1));
-  }
-  p_.closure.forget_new();
+  if (bed_.census.something_stored() && bed_.insertions.any_due(step + 1 + bed_.run.reset_by))
+    bed_.run.ask_for_reneighbouring(step);
 }
 
 // ------------------------------------------------------------------------------------------------------------ state
 
 double Culling::largest_radius(int type) const {
-  const std::vector<double>& largest = p_.bed.solid.largest_radius_by_type();
+  const std::vector<double>& largest = bed_.solid.largest_radius_by_type();
   return type >= 0 && type < static_cast<int>(largest.size()) ? largest[static_cast<std::size_t>(type)] : 0.0;
-}
-
-void Culling::hold_meshes() {
-  interface_meshes();
-  p_.meshes.hold();
-}
-
-const std::map<int, InterfaceMesh>& Culling::interface_meshes() {
-  const bool stand_in = p_.shown.shown() && p_.meshes.behind();
-  if (stand_in) p_.shown.stand_in_for_missing(p_.bed.arrivals);
-  const auto& meshes = p_.files.ask_meshes();
-  if (stand_in) p_.bed.arrivals.clear();
-  return meshes;
 }
 
 std::vector<double> Culling::restart_state() {
   // the command write_restart exchanges atoms, and builds no neighbour lists
-  if (phase_ == Phase::beginning && p_.bed.solid.has_store()) take_arrivals();
-  std::vector<double> state = p_.snapshot.write();
-  const std::int64_t interior = state.empty() ? 0 : Snapshot::interior_of(state);
-  if (interior > 0 && (phase_ == Phase::beginning || !told_of_file_))
-    p_.bed.run.say("the restart file holds " + std::to_string(interior) +
-                   " interior granules besides the atoms: a deck that reads it needs a fix solid/cull of the same ID");
-  told_of_file_ = phase_ != Phase::beginning;
-  return state;
+  if (phase_ == Phase::beginning && bed_.solid.has_store()) change_.take_arrivals();
+  return p_.snapshot.write(phase_ == Phase::beginning);
 }
 
 void Culling::enclose_stored(Box& box) const {
-  if (p_.bed.solid.has_store()) p_.bed.stored.enclose(box);
+  if (bed_.solid.has_store()) bed_.stored.enclose(box);
 }
 
-double Culling::memory_bytes() const { return static_cast<double>(p_.bed.shell.bytes() + p_.bed.solid.memory_bytes()); }
+double Culling::memory_bytes() const { return static_cast<double>(bed_.shell.bytes() + bed_.solid.memory_bytes()); }
 
 }  // namespace solidcull

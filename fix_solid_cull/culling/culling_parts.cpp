@@ -13,13 +13,12 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       cover(bed, motion, wake),
       survey(bed, motion, walls),
       pacing(bed.scales),
-      exchange(bed, walls, cover, grounding),
+      exchange(bed),
       refill(bed, exchange),
       closure(bed, walls, exchange),
       freezing(bed),
       parcels(bed, cover),
       handover(bed, parcels),
-      lost(bed),
       snapshot(bed, parcels, gravity, cover),
       shown(bed, wake),
       meshes(bed, shown),
@@ -30,6 +29,7 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       followers{&bed.shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown} {
   for (BodyFollower* f : std::initializer_list<BodyFollower*>{&motion, &grounding, &closure, &handover, &cover, &meshes})
     bed.solid.followed_by(*f);
+  for (StoreFollower* f : std::initializer_list<StoreFollower*>{&walls, &grounding, &cover}) exchange.followed_by(*f);
 }
 
 }  // namespace solidcull

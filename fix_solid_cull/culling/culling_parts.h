@@ -1,6 +1,7 @@
 // The parts of the culling, wired to each other.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "bed.h"
@@ -13,7 +14,6 @@
 #include "grounding.h"
 #include "handover.h"
 #include "invariants.h"
-#include "lost_atoms.h"
 #include "membership_change.h"
 #include "output_files.h"
 #include "pacing.h"
@@ -35,6 +35,10 @@ struct CullingParts {
   /// types: how many types of granules the engine has.
   CullingParts(const Ports& engine, const Settings& settings, int types);
   CullingParts(const CullingParts&) = delete;
+  /// The only place where the rebuilds of neighbour lists that the culling asks for are counted. Local.
+  void ask_for_build(std::int64_t step) {
+    if (bed.run.ask_for_reneighbouring(step)) pacing.count_build();
+  }
   /// What a membership change works on.
   MembershipChange::Parts for_change() { return {bed, survey, exchange, closure, freezing}; }
 
@@ -57,7 +61,6 @@ struct CullingParts {
   ContactFreezing freezing;
   Parcels parcels;
   Handover handover;
-  LostAtoms lost;
   Snapshot snapshot;
   ShownBed shown;
   BodyMeshes meshes;

@@ -19,6 +19,10 @@ constexpr double no_load = 1e-6;
 
 }  // namespace
 
+void Grounding::goes(int i, StoredGranule&, std::vector<WallLoad>& loads) {
+  if (walls_[i].near && bed_.scales.sleeping()) loads = wall_loads_on(i);
+}
+
 std::vector<WallLoad> Grounding::wall_loads_on(int i) const {
   const Locked& e = bed_.shell[i];
   const double mass = bed_.atoms.mass[i];

@@ -8,11 +8,12 @@
 #include "bed.h"
 #include "body_motion.h"
 #include "flat_map.h"
+#include "store_exchange.h"
 #include "wall_survey.h"
 
 namespace solidcull {
 
-class Grounding : public BodyFollower {
+class Grounding : public BodyFollower, public StoreFollower {
  public:
   Grounding(Bed& bed, const BodyMotion& motion, const WallSurvey& walls) : bed_(bed), motion_(motion), walls_(walls) {}
 
@@ -26,15 +27,14 @@ class Grounding : public BodyFollower {
   bool lets_go() const { return !to_let_go_.empty(); }
   /// In each step: walls feel what stored granules press on them. Local.
   void press_on_walls();
-  /// What walls do to an interface granule that nothing else touches: what meshes that report their load do to it, and the rest.
-  /// Local.
-  std::vector<WallLoad> wall_loads_on(int i) const;
-
+  void goes(int i, StoredGranule& g, std::vector<WallLoad>& loads) override;
   void merged(int gone, int kept, bool same_frame) override;
   void grounded_or_let_go(int body) override { forgotten(body); }
   void forgotten(int body) override;
 
  private:
+  /// What walls do to an interface granule that nothing else touches: what meshes that report their load do to it, and the rest.
+  std::vector<WallLoad> wall_loads_on(int i) const;
   struct Sum {
     Vec3 value = Vec3::Zero();
   };

@@ -1,6 +1,7 @@
 #include "handover.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace solidcull {
 
@@ -56,23 +57,45 @@ bool Handover::send_home() {
   return true;
 }
 
-std::vector<LostGranule> Handover::take_over() {
+std::size_t Handover::take_over() {
   for (int i = 0; i < bed_.atoms.owned; ++i) {
     if (!bed_.shell[i].locked || bed_.shell[i].body != Locked::arriving) continue;
-    const std::int64_t tag = bed_.atoms.tag[i];
-    const Arrival* a = bed_.arrivals.find(tag);
-    if (!a) throw InternalError("interface granule " + std::to_string(tag) + " came from another rank without its body");
-    bed_.shell.arrives(i, a->at);
-    bed_.shell.label(i, bed_.groups.key_of(a->at.body));
-    bed_.arrivals.erase(tag);
+    const SolidBodies::Place at = bed_.arrivals.take(bed_.atoms.tag[i]).at;
+    bed_.shell.arrives(i, at);
+    bed_.shell.label(i, bed_.groups.key_of(at.body));
   }
-  std::vector<LostGranule> lost;
-  bed_.arrivals.for_each([&](std::int64_t tag, const Arrival& a) {
-    lost.push_back({tag, {a.mass, a.at.position, a.radius, a.held}});
-  });
-  std::sort(lost.begin(), lost.end(), [](const LostGranule& a, const LostGranule& b) { return a.tag < b.tag; });
-  bed_.arrivals.clear();
-  return lost;
+  const std::vector<LostGranule> missing = bed_.arrivals.take_missing();
+  on_the_way_.insert(on_the_way_.end(), missing.begin(), missing.end());
+  return missing.size();
+}
+
+void Handover::remember() {
+  before_.clear();
+  if (bed_.solid.bodies().locked() == 0) return;
+  const Atoms& atoms = bed_.atoms;
+  for (int i = 0; i < atoms.owned; ++i) {
+    const Locked& e = bed_.shell[i];
+    if (e.in_body()) before_.push_back({atoms.tag[i], {atoms.mass[i], e.place, atoms.radius[i], e.held}});
+  }
+}
+
+bool Handover::forget_lost() {
+  std::size_t here = 0;
+  for (int i = 0; i < bed_.atoms.owned; ++i) here += bed_.shell[i].locked;
+  std::vector<LostGranule> lost = std::exchange(on_the_way_, {});
+  if (here != bed_.solid.bodies().locked()) {
+    FlatMap<char> present;
+    for (int i = 0; i < bed_.atoms.owned; ++i) present[bed_.atoms.tag[i]] = 1;
+    for (const LostGranule& b : before_)
+      if (!present.contains(b.tag) && bed_.solid.bodies().body_of(b.tag) && !bed_.solid.store().contains(b.tag))
+        lost.push_back(b);
+  }
+  if (!bed_.ranks.any(!lost.empty())) return false;
+  bed_.index.index(bed_.atoms);
+  for (const LostGranule& b : lost) bed_.solid.unlock(b.tag, b.granule);
+  for (const LostGranule& b : lost) bed_.solid.thaw(b.tag);
+  bed_.split_bodies();
+  return true;
 }
 
 }  // namespace solidcull

@@ -1,5 +1,5 @@
 // Granules of bodies go to the rank that owns their place: those in the store at once, interface granules with the engine's
-// exchange.
+// exchange. What the engine loses on the way, or anywhere else, is a member of no body any more.
 #pragma once
 
 #include <map>
@@ -10,16 +10,26 @@
 
 namespace solidcull {
 
+/// Owns what is on its way between ranks, and what was in the shell when the engine was given its atoms.
 class Handover : public BodyFollower {
  public:
   Handover(Bed& bed, Parcels& parcels) : bed_(bed), parcels_(parcels) {}
 
   /// At the end of a membership change. True if something went. Collective.
   bool send_home();
-  /// After the engine's exchange: interface granules that have come find their bodies. Gives those that were announced and did
-  /// not come: they went farther than to the next rank, and the engine has lost them. std::exception for one that was not
+  /// After the engine's exchange: interface granules that have come find their bodies. Those that were announced and did not
+  /// come went farther than to the next rank, and the engine has lost them: returns how many. InternalError for one that was not
   /// announced. Local.
-  std::vector<LostGranule> take_over();
+  std::size_t take_over();
+
+  // --- granules that have left the box, or were deleted
+  /// The engine is given its atoms: what is in the shell now. Local.
+  void remember();
+  /// Those that are not there any more leave their bodies. True if there were any, on any rank; then bodies are to be settled
+  /// anew. Collective.
+  bool forget_lost();
+  void release_memory() { before_.shrink_to_fit(); }
+
   /// Subdomains are others. Local.
   void forget_homes() { at_home_.clear(); }
 
@@ -34,7 +44,9 @@ class Handover : public BodyFollower {
 
   Bed& bed_;
   Parcels& parcels_;
-  std::map<int, Pose> at_home_;  // frames of the store when their granules were last compared with the subdomain
+  std::vector<LostGranule> before_;      // interface granules of this rank when the engine was last given its atoms
+  std::vector<LostGranule> on_the_way_;  // announced by another rank, and lost
+  std::map<int, Pose> at_home_;          // frames of the store when their granules were last compared with the subdomain
 };
 
 }  // namespace solidcull

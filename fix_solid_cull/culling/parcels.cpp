@@ -314,7 +314,7 @@ void Parcels::take_granule(std::int64_t tag, const Taken& t) {
   } else if (i && bed_.shell[*i].body == 0) {
     bed_.shell.arrives(*i, at);
   } else {
-    bed_.arrivals[tag] = {at, g.mass, g.radius, g.held};
+    bed_.arrivals.announce(tag, {at, g.mass, g.radius, g.held});
   }
 }
 

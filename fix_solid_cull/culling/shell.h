@@ -67,10 +67,12 @@ class Shell : public FollowsAtoms {
 
   const Locked& operator[](int i) const { return rows_[i]; }
   bool locked(int i) const { return rows_[i].locked; }
+  /// Another number whenever it may be others that are locked, other atoms, or other places in bodies.
+  std::uint64_t version() const { return version_; }
 
   /// Owned atom i is locked in this step, with the motion that it has; `normal_load`: what its contacts press with (N).
   void lock(Atoms& atoms, int i, std::int64_t step, double normal_load, bool held) {
-    Locked& e = rows_[i];
+    Locked& e = changed(i);
     e.locked = e.fresh = true;
     e.load_change = Vec3::Zero();
     e.normal_load = normal_load;
@@ -83,7 +85,7 @@ class Shell : public FollowsAtoms {
   }
   /// It will be exterior; what its body must know of it stays until left_body().
   void unlock(Atoms& atoms, int i) {
-    Locked& e = rows_[i];
+    Locked& e = changed(i);
     e.locked = e.fresh = false;
     e.excess = 0;
     e.normal_load = Locked::not_known;
@@ -91,14 +93,14 @@ class Shell : public FollowsAtoms {
     labels_[i] = 0;
   }
   void left_body(int i) {
-    Locked& e = rows_[i];
+    Locked& e = changed(i);
     e.lock_step = -1;
     e.body = 0;
     e.held = false;
   }
   /// Out of the store, as atom i, in this step. `lock_step`: see StoreExchange.
   void came_back(Atoms& atoms, int i, const StoredGranule& g, std::int64_t lock_step, std::int64_t step) {
-    Locked& e = rows_[i];
+    Locked& e = changed(i);
     e = Locked();
     e.locked = e.fresh = true;
     e.body = g.body;
@@ -113,34 +115,36 @@ class Shell : public FollowsAtoms {
   }
 
   /// As it was, on this rank.
-  void put(int i, const Locked& e) { rows_[i] = e; }
+  void put(int i, const Locked& e) { changed(i) = e; }
   /// Body and place, as locking gives them, or as they are after a split or a merge.
   void stands(int i, const SolidBodies::Place& at) {
-    rows_[i].body = at.body;
-    rows_[i].place = at.position;
+    Locked& e = changed(i);
+    e.body = at.body;
+    e.place = at.position;
   }
   /// The same granule seen from another frame of its body.
   void reframe(int i, const Pose& from, const Pose& to) {
-    Locked& e = rows_[i];
+    Locked& e = changed(i);
     e.place = to.to_frame(from.to_world(e.place));
     e.reference = to.turned_to_frame(from.turned_to_world(e.reference));
     e.load_change = to.turned_to_frame(from.turned_to_world(e.load_change));
   }
-  void set_body(int i, int body) { rows_[i].body = body; }
+  void set_body(int i, int body) { changed(i).body = body; }
   /// The frame becomes the world's.
   void to_world_frame(int i, const Pose& pose) {
-    Locked& e = rows_[i];
+    Locked& e = changed(i);
     e.place = pose.to_world(e.place);
     loads_to_world(e, pose);
   }
   /// It goes to another rank: its loads are the world's until it is taken over there.
   void leaves_rank(int i) {
-    loads_to_world(rows_[i], bodies_.pose(rows_[i].body));
-    rows_[i].body = Locked::arriving;
+    Locked& e = changed(i);
+    loads_to_world(e, bodies_.pose(e.body));
+    e.body = Locked::arriving;
   }
   /// The engine brought it from another rank.
   void is_arriving(int i) {
-    if (rows_[i].locked) rows_[i].body = Locked::arriving;
+    if (rows_[i].locked) changed(i).body = Locked::arriving;
   }
   /// It has come from another rank or a file: loads turn from the world to the frame of its body.
   void arrives(int i, const SolidBodies::Place& at) {
@@ -181,10 +185,12 @@ class Shell : public FollowsAtoms {
     labels_.resize(static_cast<std::size_t>(room));
   }
   void copy(int from, int to) override {
+    ++version_;
     rows_.copy(from, to);
     labels_[to] = labels_[from];
   }
   void reset(int i) override {
+    ++version_;
     rows_.reset(i);
     labels_[i] = 0;
   }
@@ -196,6 +202,7 @@ class Shell : public FollowsAtoms {
   }
   /// What comes from another rank is to be taken over; what comes from a file has no body yet.
   void unpack(int i, const double* from) override {
+    ++version_;
     rows_.unpack(i, from);
     labels_[i] = 0;
   }
@@ -207,6 +214,10 @@ class Shell : public FollowsAtoms {
   std::size_t bytes() const { return rows_.bytes(); }
 
  private:
+  Locked& changed(int i) {
+    ++version_;
+    return rows_[i];
+  }
   static void loads_to_world(Locked& e, const Pose& pose) {
     e.reference = pose.turned_to_world(e.reference);
     e.load_change = pose.turned_to_world(e.load_change);
@@ -214,6 +225,7 @@ class Shell : public FollowsAtoms {
 
   const SolidBodies& bodies_;
   PerGranule<Locked> rows_;
+  std::uint64_t version_ = 0;
   std::vector<double> labels_;
 };
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "bed.h"
@@ -45,8 +46,10 @@ class ShellClosure : public BodyFollower {
   void forget_new();  ///< local
 
   /// A run begins: walls may be others, and stored granules at them are atoms until they are seen to rest.
-  void begin_run(bool other_walls) { new_run_ = other_walls; }
-  void run_has_begun() { new_run_ = false; }
+  void begin_run(bool other_walls) { new_run_ = walls_unfelt_ = other_walls; }
+  void run_begun() { new_run_ = false; }
+  /// Whether what came out for that has not felt its walls yet: it is about to.
+  bool take_walls_unfelt() { return std::exchange(walls_unfelt_, false); }
 
   /// Ranks tell each other what they have that is exterior, or the shell of another body. Collective.
   void share();
@@ -109,7 +112,7 @@ class ShellClosure : public BodyFollower {
   std::vector<Foreign> foreign_;         // other ranks' and periodic images'
   std::map<int, SeenWalls> seen_walls_;  // when frames of the store were last compared with walls
   bool some_made_ = false;               // on this rank
-  bool new_run_ = false;
+  bool new_run_ = false, walls_unfelt_ = false;
   bool store_asked_ = false;        // a look saw interface granules that nothing holds any more
   int builds_without_storing_ = 0;  // since they were last looked for
   std::size_t stay_near_ = 0;       // interface granules that stayed atoms the last time because something is near

@@ -83,7 +83,7 @@ void ShownBed::note(int i, bool stored, std::uint64_t sum) {
 void ShownBed::stand_in_for_missing(Arrivals& arrivals) const {
   for (std::size_t k = 0; k < interface_.size(); ++k) {
     const Locked& e = interface_[k].state;
-    arrivals[granules_[k].tag] = {{e.body, e.place}, granules_[k].mass, granules_[k].radius, e.held};
+    arrivals.announce(granules_[k].tag, {{e.body, e.place}, granules_[k].mass, granules_[k].radius, e.held});
   }
 }
 

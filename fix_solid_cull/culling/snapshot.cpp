@@ -54,7 +54,7 @@ constexpr const char* damaged = "the restart file is damaged where it holds this
 
 // ------------------------------------------------------------------------------------------------------------ out
 
-std::vector<double> Snapshot::write() {
+std::vector<double> Snapshot::write(bool run_begins) {
   bed_.index.index(bed_.atoms);
   const bool store = bed_.solid.has_store();
   Ledger::Counters sums = bed_.solid.ledger().counters();
@@ -88,6 +88,10 @@ std::vector<double> Snapshot::write() {
   state.insert(state.end(), radii.begin(), radii.end());
   const auto sum = check_sum(state.data(), state.size());
   state.insert(state.end(), sum.begin(), sum.end());
+  if (stored > 0 && (run_begins || !told_))
+    bed_.run.say("the restart file holds " + std::to_string(stored) +
+                 " interior granules besides the atoms: a deck that reads it needs a fix solid/cull of the same ID");
+  told_ = !run_begins;
   return state;
 }
 
@@ -130,8 +134,6 @@ std::vector<double> Snapshot::from_bytes(const char* bytes) {
   if (!std::equal(sum.begin(), sum.end(), state.begin() + static_cast<std::ptrdiff_t>(size))) throw InputError(damaged);
   return state;
 }
-
-std::int64_t Snapshot::interior_of(const std::vector<double>& state) { return static_cast<std::int64_t>(state[1 + interior]); }
 
 void Snapshot::read(const std::vector<double>& state, const std::string& file) {
   state_.assign(state.begin() + 1, state.end() - check_sum_size);

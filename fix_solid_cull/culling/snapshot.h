@@ -18,8 +18,9 @@ class Snapshot {
   Snapshot(Bed& bed, Parcels& parcels, EffectiveGravity& gravity, const Cover& cover)
       : bed_(bed), parcels_(parcels), gravity_(gravity), cover_(cover) {}
 
-  /// On rank 0 the numbers for the file's head, the first of them how many they are; empty elsewhere. Collective.
-  std::vector<double> write();
+  /// On rank 0 the numbers for the file's head, the first of them how many they are; empty elsewhere. Says once a run what the
+  /// file holds, and again where a run begins. Collective.
+  std::vector<double> write(bool run_begins);
   /// The section that goes with them, at the end of the file; nothing may have changed since. InputError where it could not be
   /// written. Collective.
   void append_to(const std::string& file);
@@ -27,7 +28,6 @@ class Snapshot {
   /// What write() gave, of its bytes, which need not be aligned. InputError for what another version wrote, or what is not what
   /// was written. Local.
   static std::vector<double> from_bytes(const char* bytes);
-  static std::int64_t interior_of(const std::vector<double>& state);  ///< granules that the file holds besides atoms
   /// Scales, counters and largest radii are known at once, the rest waits in the file for take_up(). InputError for a file whose
   /// section is not there, or is that of another file. Collective.
   void read(const std::vector<double>& state, const std::string& file);
@@ -46,6 +46,7 @@ class Snapshot {
   const Cover& cover_;
   std::vector<double> state_;   // of the file's head
   std::string file_;            // that was read
+  bool told_ = false;           // that files of this run hold more than atoms
   std::uint64_t identity_ = 0;  // of the file that is being written
 };
 

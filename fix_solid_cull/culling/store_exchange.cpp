@@ -18,7 +18,6 @@ int StoreExchange::bring_back(std::int64_t tag) {
   const int i = atoms.put_back(record, g.layout);
   const std::int64_t now = bed_.run.step;
   bed_.shell.came_back(atoms, i, g, g.lock_step == locked_as_it_was_stored && still_there ? now : g.lock_step, now);
-  walls_.came_back(i, g.walls);
   const SolidBody& body = bed_.solid.bodies().body(g.body);
   const Vec3 x = body.pose.to_world(g.position);
   if (!still_there) {
@@ -27,7 +26,7 @@ int StoreExchange::bring_back(std::int64_t tag) {
   }
   atoms.set_velocity(i, body.twist.at(x));
   if (bed_.contacts.turn_granules) atoms.set_spin(i, body.twist.spin);
-  cover_.came_back(i, x);
+  for (StoreFollower* f : followers_) f->came_back(i, g, x);
   bed_.index.set(tag, i);
   if (bed_.scales.refills()) came_back_.push_back(tag);
   return i;
@@ -64,15 +63,14 @@ void StoreExchange::put_away(int i) {
   g.lock_step = e.lock_step;
   g.load_change = e.load_change;
   g.normal_load = e.normal_load;
-  g.walls = walls_[i].touched;
   g.held = e.held;
+  std::vector<WallLoad> loads;
+  for (StoreFollower* f : followers_) f->goes(i, g, loads);
   const std::int64_t now = bed_.run.step;
   if (bed_.scales.image_by_place()) {
     g = bed_.solid.as_stored(g);
     g.lock_step = e.lock_step == now && bed_.scales.compact() ? locked_as_it_was_stored : locked_long_ago;
   }
-  std::vector<WallLoad> loads;
-  if (walls_[i].near && bed_.scales.sleeping()) loads = grounding_.wall_loads_on(i);
   if (stored_at_ != now) {
     stored_at_ = now;
     const bool places = !bed_.run.any_periodic() || bed_.scales.image_by_place();  // the place tells which image

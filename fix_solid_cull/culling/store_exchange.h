@@ -6,17 +6,24 @@
 #include <vector>
 
 #include "bed.h"
-#include "cover.h"
-#include "grounding.h"
-#include "wall_survey.h"
 
 namespace solidcull {
+
+/// Whoever knows something of an interface granule follows it into the store and out again. Local.
+class StoreFollower {
+ public:
+  virtual ~StoreFollower() = default;
+  /// Interface granule i is about to go: what the store is to know of it, and the loads of walls that it bears.
+  virtual void goes(int /*i*/, StoredGranule& /*g*/, std::vector<WallLoad>& /*loads*/) {}
+  /// It has come back as atom i, at this place of the world (m).
+  virtual void came_back(int /*i*/, const StoredGranule& /*g*/, const Vec3& /*x*/) {}
+};
 
 /// Only while membership changes: atoms take other indices, which the index of tags follows. Local.
 class StoreExchange {
  public:
-  StoreExchange(Bed& bed, WallSurvey& walls, Cover& cover, const Grounding& grounding)
-      : bed_(bed), walls_(walls), cover_(cover), grounding_(grounding) {}
+  explicit StoreExchange(Bed& bed) : bed_(bed) {}
+  void followed_by(StoreFollower& follower) { followers_.push_back(&follower); }
 
   /// Interface granule i goes to the store; the last owned atom takes its index.
   void put_away(int i);
@@ -42,9 +49,7 @@ class StoreExchange {
   static constexpr std::int64_t never = -1;
 
   Bed& bed_;
-  WallSurvey& walls_;
-  Cover& cover_;
-  const Grounding& grounding_;
+  std::vector<StoreFollower*> followers_;
   std::vector<std::int64_t> came_back_;
   int stored_groups_ = 0;
   std::int64_t stored_at_ = never;  // step in which granules last went into the store

@@ -8,6 +8,7 @@
 
 #include "bed.h"
 #include "per_granule.h"
+#include "store_exchange.h"
 #include "wake_requests.h"
 
 namespace solidcull {
@@ -37,16 +38,16 @@ struct AtWall {
 };
 
 /// Local.
-class WallSurvey {
+class WallSurvey : public StoreFollower {
  public:
   WallSurvey(const Bed& bed, WakeRequests& wake) : bed_(bed), wake_(wake) {}
 
   const AtWall& operator[](int i) const { return rows_[i]; }
   PerGranule<AtWall>& rows() { return rows_; }
-  /// It has come out of the store, where this much was known.
-  void came_back(int i, int walls_touched) {
+  void goes(int i, StoredGranule& g, std::vector<WallLoad>&) override { g.walls = rows_[i].touched; }
+  void came_back(int i, const StoredGranule& g, const Vec3&) override {
     rows_.reset(i);
-    rows_[i].touched = walls_touched;
+    rows_[i].touched = g.walls;
   }
 
   /// At a look. Interface granules wake whose wall has gone: at the start of a run any, within a run one that can move.

@@ -75,12 +75,12 @@ double Solid::kinetic_energy(int body) const { return exists(body) ? bodies_.bod
 
 // ------------------------------------------------------------------------------------------------------------ bodies
 
-void Solid::split(const MassOf& mass_of, const std::function<void(std::int64_t, int, const Vec3&)>& moved) {
+void Solid::split(const MassOf& mass_of) {
   std::set<int> came_off;
   bodies_.split(contacts_, mass_of, [&](std::int64_t tag, int body, const Vec3& place) {
     came_off.insert(body);
     if (!store_->contains(tag)) {
-      moved(tag, body, place);
+      tell([&](BodyFollower& f) { f.came_off(tag, body, place); });
       return;
     }
     const int from = store_->body_of(tag);

@@ -24,6 +24,10 @@ class BodyFollower {
   virtual ~BodyFollower() = default;
   /// `gone` was swallowed by `kept`; same_frame: its granules stand as they stood.
   virtual void merged(int /*gone*/, int /*kept*/, bool /*same_frame*/) {}
+  /// This granule, which is no stored one, is of a part that came off: it stands at this place of its new body.
+  virtual void came_off(std::int64_t /*tag*/, int /*body*/, const Vec3& /*place*/) {}
+  /// Which parts of ranks are one body has been found anew, and motions follow from that.
+  virtual void settled() {}
   virtual void grounded_or_let_go(int /*body*/) {}
   /// The frame of the body is another one now.
   virtual void frame_changed(int /*body*/) {}
@@ -110,9 +114,8 @@ class Solid {
     changed(bodies_.body_of(tag), {granule.position, granule.radius});
     bodies_.unlock(tag, granule, contacts_, given);
   }
-  /// After unlock(): bodies that came apart become several. moved(tag, body, place) is called for granules of a part that came
-  /// off which are no stored ones.
-  void split(const MassOf& mass_of, const std::function<void(std::int64_t, int, const Vec3&)>& moved);
+  /// After unlock(): bodies that came apart become several.
+  void split(const MassOf& mass_of);
   /// After lock() and tie(): the stored granules of swallowed bodies move to the frames in which they are now; the interface
   /// granules' contacts were turned before, see turn_contacts().
   void adopt_swallowed();
@@ -173,6 +176,9 @@ class Solid {
   /// Both at once, for a granule with all contacts that it has with granules which are stored already.
   void add_stored(const StoredGranule& g, const double* record, int length, const ContactList& contacts);
   void stands_otherwise() { ++standing_version_; }
+  void tell_settled() {
+    tell([](BodyFollower& f) { f.settled(); });
+  }
 
   // --- walls
   double weigh_wall_loads(int body, const Vec3& load) { return wall_loads_.weigh(body, load); }

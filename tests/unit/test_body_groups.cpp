@@ -92,7 +92,8 @@ TEST(BodyGroups, each_body_is_counted_once_over_all_ranks_and_ghosts_know_their_
     row.add(11, some_velocities(2), 0.03, 0.03);   // all on rank 1
     row.lock();
     std::int64_t first_parts = 0;
-    for (const auto& b : row.parts.bed.solid.bodies().bodies()) first_parts += row.parts.bed.groups.has_key_of_first_part(b.first);
+    for (const auto& b : row.parts.bed.solid.bodies().bodies())
+      first_parts += row.parts.bed.groups.has_key_of_first_part(b.first);
     w.ranks.sum(&first_parts, 1);
     EXPECT_EQ(first_parts, 2);
     row.parts.reneighbour();

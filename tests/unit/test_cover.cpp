@@ -160,13 +160,13 @@ TEST(Cover, an_interface_granule_that_loses_its_cover_asks_to_wake) {
   Culled cube;
   EXPECT_FALSE(cube.parts.wake.any_here());
   cube.remove_above(6);  // one layer of two and a half: half a diameter of the cover is gone, and that is borne
-  cube.parts.motion.is_stale();
+  cube.parts.motion.begin_lists();
   cube.parts.motion.refresh();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
   const std::size_t after_one = cube.parts.wake.take(cube.world.ranks, cube.parts.bed.scales.wake_up()).balls.size();
   cube.remove_above(5);  // the second: half a diameter is left
-  cube.parts.motion.is_stale();
+  cube.parts.motion.begin_lists();
   cube.parts.motion.refresh();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
@@ -201,7 +201,7 @@ TEST(Cover, a_mass_that_moves_as_one_keeps_its_surface_and_the_observer_rides_on
   for (int i = 0; i < cube.world.atoms.owned; ++i) cube.world.atoms.set_place(i, cube.world.atoms.place(i) + shift);
   cube.parts.bed.solid.body(cube.parts.body_of(Cube::tag(3, 3, 3))).shift(shift);
   cube.world.reneighbour();
-  cube.parts.motion.is_stale();
+  cube.parts.motion.begin_lists();
   cube.parts.motion.refresh();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();

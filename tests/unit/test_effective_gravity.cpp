@@ -30,7 +30,7 @@ struct Block {
   }
   SolidBody& body() { return parts.bed.solid.body(number); }
   void watch() {
-    parts.motion.is_stale();
+    parts.motion.begin_lists();
     parts.motion.refresh();
     parts.gravity.watch();
   }

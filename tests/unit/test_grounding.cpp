@@ -98,7 +98,8 @@ TEST(Grounding, not_at_a_wall_that_can_move) {
 
 TEST(Grounding, not_while_it_moves_or_is_out_of_balance) {
   Resting moves(on_ground()), pressed(on_ground());
-  for (int i = 0; i < 3; ++i) moves.world.atoms.set_velocity(i, Vec3(0.01 * moves.parts.bed.scales.solid_state().speed * 6, 0, 0));
+  for (int i = 0; i < 3; ++i)
+    moves.world.atoms.set_velocity(i, Vec3(0.01 * moves.parts.bed.scales.solid_state().speed * 6, 0, 0));
   moves.lock({1, 2, 3});  // 6 % of the solid-state speed: above the 5 % that is drift
   pressed.lock({1, 2, 3});
   moves.step();
@@ -185,9 +186,9 @@ TEST(Grounding, the_mean_load_follows_when_bodies_merge) {
   ASSERT_TRUE(bed.body(1).grounded && bed.body(11).grounded);
   bed.steps(200, {{1, Vec3(0.8 * bed.weight, 0, 0)}});  // of five granules more than a tenth
   bed.parts.bed.solid.tie(2, 11, bed.parts.bed.masses.by_tag());
-  adopt_places(bed.world.atoms, bed.parts.bed.solid, bed.parts.bed.shell, bed.parts.bed.arrivals);
+  bed.parts.bed.adopt_places();
   ASSERT_EQ(bed.parts.body_of(1), bed.parts.body_of(13));
-  bed.parts.motion.is_stale();
+  bed.parts.motion.begin_lists();
   bed.look();
   EXPECT_TRUE(bed.parts.grounding.lets_go());
 }

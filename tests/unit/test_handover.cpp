@@ -115,7 +115,7 @@ struct Block {
       body.shift(by);
       body.take_twist();
     }
-    parts.motion.is_stale();
+    parts.motion.begin_lists();
     parts.motion.refresh();
     parts.motion.place();
   }
@@ -171,19 +171,20 @@ TEST(Handover, an_interface_granule_that_was_announced_and_does_not_come_has_lef
     block.shift(Vec3(0.031, 0, 0));
     block.parts.bed.index.index(w.atoms);
     block.parts.handover.send_home();
-    block.parts.lost.remember();
+    block.parts.handover.remember();
     // the engine takes it along to the next rank only, and drops it where it has gone farther
     for (int i = w.atoms.owned - 1; i >= 0; --i)
       if (!w.ranks.owns(w.atoms.place(i))) w.atoms.take_out(i);
-    const std::vector<LostGranule> lost = block.parts.handover.take_over();
-    EXPECT_EQ(lost.empty(), w.ranks.me == 0);
-    block.parts.lost.add(lost);
-    EXPECT_TRUE(block.parts.lost.forget_lost());
-    for (const LostGranule& g : lost) EXPECT_EQ(block.parts.body_of(g.tag), 0);
+    std::vector<std::int64_t> announced;
+    block.parts.bed.arrivals.for_each_tag([&](std::int64_t tag) { announced.push_back(tag); });
+    EXPECT_EQ(announced.empty(), w.ranks.me == 0);
+    EXPECT_EQ(block.parts.handover.take_over(), announced.size());
+    EXPECT_TRUE(block.parts.handover.forget_lost());
+    for (const std::int64_t tag : announced) EXPECT_EQ(block.parts.body_of(tag), 0);
     block.parts.bed.groups.settle();
     block.parts.bed.census.count_bodies();
     EXPECT_NO_THROW(block.parts.invariants.check());
-    EXPECT_FALSE(block.parts.lost.forget_lost());
+    EXPECT_FALSE(block.parts.handover.forget_lost());
   });
 }
 
@@ -194,10 +195,10 @@ TEST(Handover, what_leaves_the_box_beside_another_rank_is_announced_to_nobody) {
     block.parts.bed.index.index(w.atoms);
     block.parts.closure.fetch_from_outside();
     block.parts.handover.send_home();
-    block.parts.lost.remember();
+    block.parts.handover.remember();
     w.exchange();
-    EXPECT_TRUE(block.parts.handover.take_over().empty());
-    EXPECT_TRUE(block.parts.lost.forget_lost());
+    EXPECT_EQ(block.parts.handover.take_over(), 0u);
+    EXPECT_TRUE(block.parts.handover.forget_lost());
     block.parts.bed.groups.settle();
     block.parts.bed.census.count_bodies();
     EXPECT_NO_THROW(block.parts.invariants.check());

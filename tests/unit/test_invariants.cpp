@@ -111,29 +111,29 @@ TEST(Invariants, other_mass_properties_than_those_of_the_granules_are_seen) {
 
 TEST(LostAtoms, what_leaves_the_box_leaves_its_body) {
   TwoBodies two;
-  two.parts.lost.remember();
-  EXPECT_FALSE(two.parts.lost.forget_lost());
+  two.parts.handover.remember();
+  EXPECT_FALSE(two.parts.handover.forget_lost());
   // the second row sticks out of the box by its last granule
   two.body(11).shift(Vec3(1 - 0.999 * 2 * r * 2.5, 0, 0));
   two.parts.motion.refresh();
   two.parts.motion.place();
-  two.parts.lost.remember();
+  two.parts.handover.remember();
   two.world.exchange();
   ASSERT_EQ(two.world.at(14), -1);
-  EXPECT_TRUE(two.parts.lost.forget_lost());
+  EXPECT_TRUE(two.parts.handover.forget_lost());
   EXPECT_EQ(two.parts.body_of(14), 0);
   EXPECT_EQ(two.body(11).mass.count, 3);
   EXPECT_FALSE(two.parts.bed.solid.contacts().contains(13, 14));
   EXPECT_TRUE(two.parts.bed.solid.contacts().contains(12, 13));
   EXPECT_EQ(two.broken(), "");
-  EXPECT_FALSE(two.parts.lost.forget_lost());
+  EXPECT_FALSE(two.parts.handover.forget_lost());
 }
 
 TEST(LostAtoms, a_body_that_loses_its_middle_comes_apart) {
   TwoBodies two;
-  two.parts.lost.remember();
+  two.parts.handover.remember();
   two.world.atoms.take_out(two.world.at(12));  // a deck deletes it
-  EXPECT_TRUE(two.parts.lost.forget_lost());
+  EXPECT_TRUE(two.parts.handover.forget_lost());
   EXPECT_NE(two.parts.body_of(11), two.parts.body_of(13));
   EXPECT_EQ(two.parts.body_of(13), two.parts.body_of(14));
   EXPECT_EQ(two.body(11).mass.count, 1);
@@ -143,9 +143,9 @@ TEST(LostAtoms, a_body_that_loses_its_middle_comes_apart) {
 
 TEST(LostAtoms, stored_granules_are_not_missed) {
   TwoBodies two;
-  two.parts.lost.remember();
+  two.parts.handover.remember();
   two.parts.put_away({11, 12});
-  EXPECT_FALSE(two.parts.lost.forget_lost());
+  EXPECT_FALSE(two.parts.handover.forget_lost());
   EXPECT_EQ(two.parts.body_of(11), two.parts.body_of(14));
 }
 
@@ -167,7 +167,7 @@ TEST(Report, counts_who_is_where) {
 TEST(Report, says_what_all_granules_have_together) {
   TwoBodies two(Vec3(0.3, 0, 0));
   two.world.add(50, Vec3(0, -0.1, 0), r, Vec3(0, 0, 2), Vec3(30, 0, 0));
-  two.parts.motion.is_stale();
+  two.parts.motion.begin_lists();
   two.parts.motion.refresh();
   two.parts.motion.give_velocities();  // interface granules move with their bodies
   const double m = two.world.mass_of(r), inertia = 0.4 * m * r * r;
@@ -176,9 +176,10 @@ TEST(Report, says_what_all_granules_have_together) {
   for (int n = 0; n < Report::of_all; ++n) before[n] = two.parts.report.value(first + n);
   EXPECT_NEAR(before[0], 9 * m, 1e-12 * m);
   const double of_bodies = before[4] + before[5] - 0.5 * m * 4 - 0.5 * inertia * 900;
-  EXPECT_NEAR(of_bodies,
-              two.parts.bed.solid.kinetic_energy(two.parts.body_of(1)) + two.parts.bed.solid.kinetic_energy(two.parts.body_of(11)),
-              1e-12 * before[4]);
+  EXPECT_NEAR(
+      of_bodies,
+      two.parts.bed.solid.kinetic_energy(two.parts.body_of(1)) + two.parts.bed.solid.kinetic_energy(two.parts.body_of(11)),
+      1e-12 * before[4]);
   two.parts.put_away({4, 14});  // whoever is stored, the sums are the same
   ++two.world.run.step;
   for (int n = 0; n < Report::of_all; ++n)

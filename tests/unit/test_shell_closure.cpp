@@ -358,7 +358,8 @@ TEST(ShellClosure, a_box_that_follows_the_granules_holds_what_is_stored) {
   Box box{Vec3(-0.5, 0, 0), Vec3(0.5, 0.25, 0)};
   row.parts.bed.stored.enclose(box);
   double farthest = -HUGE_VAL;
-  row.parts.bed.solid.store().for_each([&](const Resident& g) { farthest = std::max(farthest, row.parts.bed.solid.in_world(g)[0]); });
+  row.parts.bed.solid.store().for_each(
+      [&](const Resident& g) { farthest = std::max(farthest, row.parts.bed.solid.in_world(g)[0]); });
   EXPECT_GT(farthest, 1);
   EXPECT_NEAR(box.hi[0], farthest, 1e-12);
   EXPECT_EQ(box.lo[0], -0.5);

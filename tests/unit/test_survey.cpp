@@ -358,7 +358,7 @@ struct TwoBodies : Bed {
     parts.motion.refresh();
     parts.motion.place();
     parts.reneighbour();
-    parts.motion.is_stale();
+    parts.motion.begin_lists();
   }
 };
 
@@ -398,7 +398,7 @@ TEST(Survey, contacts_do_not_count_one_by_one_before_bodies_join) {
   bed.parts.reneighbour();
   ASSERT_NE(bed.parts.body_of(1), bed.parts.body_of(3));
   ASSERT_TRUE(bed.world.contacts.listed(1, 3) && bed.world.contacts.listed(2, 3) && bed.world.contacts.listed(2, 4));
-  bed.parts.motion.is_stale();
+  bed.parts.motion.begin_lists();
   for (int n = 1; n < looks_to_calm; ++n) {
     bed.look();
     EXPECT_TRUE(bed.proposal.joins.empty()) << n;

@@ -58,7 +58,7 @@ struct WorldParts : CullingParts {
     bed.census.count_bodies();
     bed.census.count_stored();
     bed.label_bodies();
-    motion.is_stale();
+    motion.begin_lists();
   }
   /// Owned granules with these tags are locked; what of them touches is one body. Collective.
   void lock(const std::vector<std::int64_t>& tags) {
@@ -79,7 +79,7 @@ struct WorldParts : CullingParts {
     bed.index.index(world.atoms);
     for (const std::int64_t tag : tags)
       if (const int* i = bed.index.find(tag)) exchange.put_away(*i);
-    motion.is_stale();
+    motion.begin_lists();
   }
   /// Ghosts, lists and what ranks tell each other, as between a change and the next forces. Collective.
   void reneighbour() {
@@ -91,7 +91,7 @@ struct WorldParts : CullingParts {
     bed.groups.share();
     world.contacts.build();
     leave_out();
-    motion.is_stale();
+    motion.begin_lists();
     motion.refresh();
   }
   void leave_out() {
