@@ -3,9 +3,9 @@
 
     scripts/measure_house.py [--top N] [FOLDER...]      default: fix_solid_cull region_interface_mesh
 
-Prints classes by data members and by functions, functions by lines, files by lines. Then every place where a class could write what
-another one owns: a data member that is public in a class with private ones, a friend, a function that hands out a member to be
-written, and assignments to fields of shared state (Locked, AtRest, AtWall, Drawn, Cleared, SolidBody) outside their owner's files.
+Prints classes by data members and by functions, functions by lines, files by lines; and how much the parts of the culling hold of each
+other. Then every place where a class could write what another one owns: a data member that is public in a class with private ones, a
+friend, a function that hands out a member to be written, and structs of culling/ and solid/ that several owners write (shared_state.py).
 Reads the sources as text, formatted as .clang-format has them. Exit: 0 each member has one owner, 1 it has not, 2 misuse.
 """
 import argparse
@@ -14,11 +14,11 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
+from shared_state import House
+
 ROOT = Path(__file__).resolve().parents[1]
-# who may write the fields of state that others read: the struct, its fields' owner by file
-OWNERS = {"Locked": {"shell.h"}, "AtRest": {"survey.h", "survey.cpp"}, "AtWall": {"wall_survey.h", "wall_survey.cpp"},
-          "Drawn": {"cover.h", "cover.cpp"}, "Cleared": {"shell_closure.h", "shell_closure.cpp"},
-          "SolidBody": {"solid_bodies.h", "solid_bodies.cpp"}}
+STATE = ("culling", "solid")  # folders whose structs are looked at for who writes them
+MANY_FUNCTIONS = 50
 # handed out to be written, on purpose: why
 HANDED_OUT = {
     "Solid::body": "SolidBody's own functions change it", "Solid::bodies_in_motion": "likewise",
@@ -26,6 +26,7 @@ HANDED_OUT = {
     "WallSurvey::rows": "for the engine's copies", "Survey::rows": "for the engine's copies", "Cover::rows": "for the engine's copies",
     "ShellClosure::rows": "for the engine's copies", "Shell::labels": "the engine reads f_ID there", "Culling::labels": "likewise",
     "ChunkedArray::row": "a container's elements", "FlatMap::find": "likewise", "Seen::data": "room on the caller's stack",
+    "RestartFile::name": "the engine's interface wants it so, and may change it",
 }
 FRIENDS = {
     "Expose": "how the engine's private members are reached, see engine_access.cpp",
@@ -126,6 +127,35 @@ def table(title, rows, top):
         print("  " + "  ".join(str(x) for x in row))
 
 
+def how_parts_hold_each_other(house, files, by_class):
+    """(number, what it counts) of the constructors of culling/, its structs of parts, its lines."""
+    constructors = references = 0
+    parts = []
+    for f in files:
+        if f.parent.name != "culling" or f.suffix != ".h":
+            continue
+        for name, _, body in classes(without_comments(f.read_text())):
+            for m in re.finditer(rf"(?<![\w~:]){name}\(", flat(body)):
+                taken = flat(body)[m.end():].split(")")[0] if "(" not in flat(body)[m.end():].split(")")[0] else ""
+                if re.fullmatch(rf"\s*(const )?{name} ?&+ ?\w*\s*", taken):
+                    continue  # of another of its kind
+                constructors += 1
+                references += taken.count("&")
+            fields = house.fields_by_file[f.stem].get(name, {})
+            held = [t for t in fields.values() if house.of(t.type.replace("const ", "").split("::")[-1]) not in house.open | {None}]
+            if (f.stem, name) in house.open and 2 * len(held) > len(fields):
+                parts.append((len(fields), name))
+    lines = sum(f.read_text().count("\n") for f in files if f.parent.name in STATE)
+    over = [f"{n} ({w})" for _, w, n, _ in sorted(by_class, key=lambda r: -r[1]) if w > MANY_FUNCTIONS]
+    largest = max(parts, default=(0, "none"))
+    yield references, "references that constructors of culling/ take"
+    yield constructors, "constructors of culling/"
+    yield largest[0], f"fields of the largest struct of parts: {largest[1]}"
+    yield len(over), f"classes with more than {MANY_FUNCTIONS} functions{': ' if over else ''}{', '.join(over)}"
+    yield lines, "lines of culling/ and solid/"
+    yield len(house.unknown), "writes whose target was not found out"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--top", type=int, default=12)
@@ -158,28 +188,21 @@ def main():
                 if gives and not gives.group(1).startswith("const") and f"{name}::{function}" not in HANDED_OUT and kind == "class" \
                         and not function.startswith("operator") and private:
                     faults.append(f"{where}: {name}::{function} hands out {gives.group(1)}")
-    fields = {s: set() for s in OWNERS}
-    for f in files:
-        for name, kind, body in classes(without_comments(f.read_text())):
-            if name in fields:
-                fields[name] |= set(members(body, kind)[0]["public"])
-    for f in files:
-        text = without_comments(f.read_text())
-        for struct, names in fields.items():
-            if f.name in OWNERS[struct] or not names:
-                continue
-            variable = {"SolidBody": r"(?:body|b|a\.body->|\*a\.body)", "Locked": r"(?:locked|shell_\[\w+\])", "AtRest": r"(?:r|survey_\[\w+\])",
-                        "AtWall": r"(?:wall|walls_\[\w+\])", "Drawn": r"(?:d|cover_\[\w+\])", "Cleared": r"(?:rows_\[\w+\])"}[struct]
-            for m in re.finditer(r"\b" + variable + r"\.(" + "|".join(map(re.escape, names)) + r")\s*(?:[-+|*/]?=(?!=)|\+\+)", text):
-                line = text[:m.start()].count("\n") + 1
-                declared = re.search(r"\b" + struct + r"& (?!const)", text)
-                if declared or struct == "SolidBody":
-                    faults.append(f"{f.relative_to(ROOT)}:{line}: writes {struct}::{m.group(1)}")
+    house = House({f: without_comments(f.read_text()) for f in files}, [f for f in files if f.parent.name in STATE], classes, functions_of)
+    for struct, writes in house.shared():
+        owners = defaultdict(list)
+        for w in writes:
+            owners[w.owner].append(f"{w.file.name}:{w.line}")
+        faults.append(f"{struct} is written by {len(owners)} owners: "
+                      + "; ".join(f"{o} ({', '.join(at[:3])}{', ...' if len(at) > 3 else ''})" for o, at in owners.items()))
     by_class.sort(key=lambda r: (-r[0], r[2]))
     table("classes: data members, functions", [(f"{c:4d} {w:4d}", n, p) for c, w, n, p in by_class], args.top)
     table("classes by functions", [(f"{w:4d}", n, p) for c, w, n, p in sorted(by_class, key=lambda r: -r[1])], args.top)
     table("functions: lines", [(f"{n:4d}", name) for n, name in sorted(by_function, key=lambda r: -r[0])], args.top)
     table("files: lines", [(f"{n:4d}", p) for n, p in sorted(by_file, key=lambda r: -r[0])], args.top)
+    print("\nculling/ and solid/")
+    for value, what in how_parts_hold_each_other(house, files, by_class):
+        print(f"  {value:5d}  {what}")
     print(f"\n{len(by_file)} files, {sum(n for n, _ in by_file)} lines, {len(by_function)} functions at namespace level, {len(by_class)} classes")
     if faults:
         print("\nmembers with more than one owner:")

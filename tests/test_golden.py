@@ -221,7 +221,8 @@ class Parts(unittest.TestCase):
                 hashed(b" BDV" + bytes(80))
 
     def test_seconds_are_no_result(self):
-        screen = ("fix cull solid/cull: 1 exterior, 2 interface\n"
+        screen = ("fix cull solid/cull: version 0.1.0\n"
+                  "fix cull solid/cull: 1 exterior, 2 interface\n"
                   "fix cull solid/cull: 0.2 s in the fix since it was made: load 0\n"
                   "Loop time of 3 on 1 procs\n")
         self.assertEqual(golden.said(screen), ["fix cull solid/cull: 1 exterior, 2 interface"])

@@ -15,6 +15,7 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT / "validation"))
 from solidcull_runs import engine  # noqa: E402
 
+VERSION = re.search(r"VERSION (\d+\.\d+\.\d+)", (ROOT / "CMakeLists.txt").read_text()).group(1)  # cmake_minimum_required has two numbers
 LAUNCHER = Path(os.environ.get("SOLIDCULL_LAUNCHER", ROOT / "build/liggghts-solidcull")).resolve()
 LIBRARY = LAUNCHER.parent / "libsolidcull.so"
 STOCK = shutil.which("liggghts")
@@ -686,6 +687,17 @@ class NoHarm(Case):
         self.assertGreater(float(mine.thermo()[-2].split()[4]), 0, "nothing was culled")
         self.assertEqual(mine.thermo()[-1].split()[1], "343")
         self.assertEqual(self.accepted(text, program=STOCK, preload=LIBRARY).thermo(), mine.thermo())
+
+    def test_the_fix_says_its_version_once(self):
+        run = self.accepted(deck(FIX, "run 1", "run 1"))
+        for text in (run.log, run.screen):
+            self.assertEqual(re.findall(r"^fix cull solid/cull: version .*$", text, re.M), [f"fix cull solid/cull: version {VERSION}"])
+
+    def test_the_launcher_says_its_version_without_a_deck(self):
+        for word in ("-version", "--version", "-v"):
+            done = subprocess.run([LAUNCHER, word], text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                  timeout=TIME_LIMIT, check=False)
+            self.assertEqual((done.returncode, done.stdout), (0, f"solidcull {VERSION}\n"))
 
     def test_each_run_ends_with_its_sums(self):
         run = self.accepted(BLOCK + CULL_BLOCK + "\nrun 200\nrun 200\n")

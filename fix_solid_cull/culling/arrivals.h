@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "flat_map.h"
+#include "internal_error.h"
 #include "solid.h"
 
 namespace solidcull {

@@ -20,6 +20,7 @@
 #include "restart_files.h"
 #include "run_failure.h"
 #include "settings.h"
+#include "solidcull.h"
 #include "update.h"
 
 namespace solidcull {
@@ -51,6 +52,7 @@ FixSolidCull::FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
   atom->add_callback(0);
   atom->add_callback(1);
   set_geometry_threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / comm->nprocs));
+  run_.say(std::string("version ") + solidcull_version());
 }
 
 FixSolidCull::~FixSolidCull() {

@@ -1,7 +1,10 @@
-// liggghts-solidcull: the stock LIGGGHTS with solidcull's styles. Takes every argument and signal that `liggghts` takes.
+// liggghts-solidcull: the stock LIGGGHTS with solidcull's styles. Takes every argument and signal that `liggghts` takes; and
+// `-version`, alone.
 #include <mpi.h>
 #include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "input.h"
 #include "lammps.h"
@@ -31,9 +34,21 @@ void alone() {
   setenv("OMPI_MCA_pml", "ob1", keep);
 }
 
+/// `-v` with two more words is LIGGGHTS's `-var`.
+bool asks_for_version(int argc, char** argv) {
+  if (argc != 2) return false;
+  for (const char* word : {"-version", "--version", "-v"})
+    if (strcmp(argv[1], word) == 0) return true;
+  return false;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (asks_for_version(argc, argv)) {
+    printf("solidcull %s\n", solidcull_version());
+    return 0;
+  }
   on_signal(SIGINT, LAMMPS_NS::SignalHandler::int_handler);
   on_signal(SIGTERM, LAMMPS_NS::SignalHandler::int_handler);  // mpirun turns SIGINT into SIGTERM
   on_signal(SIGUSR1, LAMMPS_NS::SignalHandler::usr1_handler);

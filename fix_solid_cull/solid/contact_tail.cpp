@@ -132,7 +132,7 @@ void ContactTail::read(WordView words) {
   for (Partner& p : partners_) {
     p.begin = at;
     if (p.known)
-      for (const HistoryBits::Unit& unit : bits_.units_) {
+      for (const HistoryBits::Unit& unit : bits_.units()) {
         if (!take(words, at, 1)) continue;
         if (unit.vector)
           at += exponent_bits + 2 * number_bits + take(words, at, length_bits);
@@ -163,11 +163,11 @@ void ContactTail::write(Words& words) const {
 
 bool ContactTail::add(std::int64_t partner, const double* history, const Vec3& normal) {
   if (partners_.size() == most || !(normal.squaredNorm() > 0)) return false;
-  histories_.resize(std::max(histories_.size(), end_ / 64 + 1 + bits_.most_words_));
+  histories_.resize(std::max(histories_.size(), end_ / 64 + 1 + bits_.most_words()));
   Writer to(histories_, end_);
   if (history) {
     const Axes axes(normal);
-    for (const HistoryBits::Unit& unit : bits_.units_) {
+    for (const HistoryBits::Unit& unit : bits_.units()) {
       const double* h = history + unit.first;
       if (unit.vector) {
         const Vec3 vector(h[0], h[1], h[2]);
@@ -197,7 +197,7 @@ bool ContactTail::history(std::size_t number, const Vec3& normal, double* histor
   if (!p.known) return false;
   const Axes axes(normal);
   std::size_t at = p.begin;
-  for (const HistoryBits::Unit& unit : bits_.units_) {
+  for (const HistoryBits::Unit& unit : bits_.units()) {
     double* h = history + unit.first;
     const bool some = take(histories_, at, 1) != 0;
     if (unit.vector) {

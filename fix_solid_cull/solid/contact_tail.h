@@ -18,15 +18,16 @@ namespace solidcull {
 /// back to the bit. What is 0 takes one bit.
 class HistoryBits {
  public:
-  /// width: numbers of a history; vectors: first indices of those that are vectors of space.
-  void set_layout(std::size_t width, const std::vector<int>& vectors);
-
- private:
-  friend class ContactTail;
   struct Unit {
     int first;
     bool vector;
   };
+  /// width: numbers of a history; vectors: first indices of those that are vectors of space.
+  void set_layout(std::size_t width, const std::vector<int>& vectors);
+  const std::vector<Unit>& units() const { return units_; }
+  std::size_t most_words() const { return most_words_; }
+
+ private:
   std::vector<Unit> units_;
   std::size_t most_words_ = 0;  // of a history
 };

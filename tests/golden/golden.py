@@ -252,9 +252,9 @@ def thermo_rows(screen):
 
 
 def said(screen):
-    """Lines of the fix itself, but for that with seconds."""
+    """Lines of the fix itself, but for those with seconds and the version."""
     lines = [line.strip() for line in screen.splitlines() if re.match(r"fix \S+ solid/cull: ", line)]
-    return [line for line in lines if " s in the fix since" not in line]
+    return [line for line in lines if " s in the fix since" not in line and "solid/cull: version " not in line]
 
 
 def hash_of_file(file):
