@@ -60,7 +60,7 @@ class Arrivals {
       const int body = bodies.body_of(tag);
       const Pose &from = bodies.pose(a.at.body), &to = bodies.pose(body);
       if (from != to) a.at.position = to.to_frame(from.to_world(a.at.position));
-      if (a.at.body != body) solid.stands(body, {a.at.position, a.radius});
+      if (a.at.body != body) solid.tell_granule(body, {a.at.position, a.radius});
       a.at.body = body;
       moved[tag] = a;
     });

@@ -10,8 +10,8 @@ Bed::Bed(const Ports& engine, const Settings& settings, int types)
 
 void Bed::came_off(std::int64_t tag, int body, const Vec3& place) {
   const int i = index.at(tag);
-  solid.stands(shell[i].body, {shell[i].place, atoms.radius[i]});
-  shell.stands(i, {body, place});
+  solid.tell_granule(shell[i].body, {shell[i].place, atoms.radius[i]});
+  shell.set_place(i, {body, place});
 }
 
 void Bed::adopt_places() {
@@ -26,10 +26,26 @@ void Bed::adopt_places() {
       solid.turn_contacts(atoms.tag[i], to.turn().transpose() * from.turn());
     }
     shell.set_body(i, body);
-    solid.stands(body, {shell[i].place, atoms.radius[i]});
+    solid.tell_granule(body, {shell[i].place, atoms.radius[i]});
   }
   arrivals.adopt_places(solid);
   solid.adopt_swallowed();
+}
+
+StoredGranule Bed::interface_granule(int i) const {
+  const Locked& e = shell[i];
+  StoredGranule g;
+  g.tag = atoms.tag[i];
+  g.type = atoms.type[i];
+  g.body = e.body;
+  g.position = e.place;
+  g.radius = atoms.radius[i];
+  g.mass = atoms.mass[i];
+  g.held = e.held;
+  g.lock_step = e.lock_step;
+  g.normal_load = e.normal_load;
+  g.load_change = e.load_change;
+  return g;
 }
 
 void Bed::label_bodies() {

@@ -21,6 +21,8 @@ struct Bed : BedState, BodyFollower {
   /// After bodies merged: granules of swallowed ones move to the frames of the bodies that they are part of now: interface
   /// granules, those that are to arrive, interior ones. Local.
   void adopt_places();
+  /// Interface granule i as its body knows it, with what it has in the shell. Local.
+  StoredGranule interface_granule(int i) const;
   /// Each atom is labelled with its body's number over all ranks. Local.
   void label_bodies();
 

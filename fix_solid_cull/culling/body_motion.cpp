@@ -94,7 +94,7 @@ void BodyMotion::take_loads() {
   for (std::size_t k = 0; k < atoms_.size(); ++k) {
     const int i = atoms_[k];
     const Vec3 in_world = atoms.force(i), torque = vec(atoms.torque + 3 * std::size_t(i));
-    if (!std::isfinite(in_world.sum() + torque.sum())) is_no_number(atoms.tag[i], "load", in_world);
+    if (!std::isfinite(in_world.sum() + torque.sum())) refuse_no_number(atoms.tag[i], "load", in_world);
     ActiveBody& a = active_[slot_[k]];
     if (moves && !a.stands) add_to_body(k, in_world - atoms.mass[i] * g, turns ? torque : Vec3(Vec3::Zero()));
     if (a.stands) a.change += in_world - atoms.mass[i] * g;
@@ -166,7 +166,7 @@ void BodyMotion::stop_at(const ActiveBody& a) const {
     throw RunFailure("the motion of solid body " + std::to_string(a.number) + " is no number: take a smaller timestep");
   const Twist& t = a.body->twist;
   const bool goes = std::isfinite(t.velocity.sum());
-  is_no_number(bed_.atoms.tag[*at], goes ? "spin" : "velocity", goes ? t.spin : t.velocity);
+  refuse_no_number(bed_.atoms.tag[*at], goes ? "spin" : "velocity", goes ? t.spin : t.velocity);
 }
 
 void BodyMotion::kick() {

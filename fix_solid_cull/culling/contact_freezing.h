@@ -36,7 +36,7 @@ class ContactFreezing {
   void rebase_thawed();
 
   /// The engine has searched for neighbours: pairs within bodies stand in its lists.
-  void lists_are_new() { inner_pairs_listed_ = true; }
+  void note_new_lists() { inner_pairs_listed_ = true; }
   bool inner_pairs_listed() const { return inner_pairs_listed_; }
   /// They leave the lists.
   void leave_out_inner_pairs();

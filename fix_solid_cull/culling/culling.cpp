@@ -107,11 +107,11 @@ void Culling::set_up_atoms() {
   between_.take_changes(other_walls);
   p_.closure.begin_run(other_walls);
   change();
-  p_.closure.run_begun();
+  p_.closure.end_setup();
 }
 
-void Culling::is_set_up() {
-  expect({Phase::beginning}, "is_set_up");
+void Culling::end_setup() {
+  expect({Phase::beginning}, "end_setup");
   // other fixes add their forces later: the loads are taken at the start of the first step
   phase_ = Phase::ready;
   if (bed_.solid.has_store()) p_.files.write_due();  // as the engine's dumps show where a run begins
@@ -149,7 +149,7 @@ void Culling::integrate() {
 
 void Culling::take_neighbours() {
   p_.motion.begin_lists();
-  lists_are_new();
+  note_new_lists();
   if (!bed_.solid.has_store()) return;
   if (bed_.census.something_locked())
     change_.take_arrivals();

@@ -25,15 +25,15 @@ class Culling {
   // --- a run begins
   void begin_run();     ///< contact model, walls and box are known
   void set_up_atoms();  ///< atoms are there, neighbour lists are not
-  void is_set_up();     ///< forces are there, but for what other fixes add later
+  void end_setup();     ///< forces are there, but for what other fixes add later
 
   // --- a time step
-  void initial_step();                                   ///< takes the loads of a run's setup
-  void integrate();                                      ///< bodies move, and carry their interface granules
-  void change() { change_.make(look_, phase_); }         ///< membership: only place where atoms come and go
-  void take_neighbours();                                ///< after the engine's exchange, when ghosts are there
-  void lists_are_new() { p_.freezing.lists_are_new(); }  ///< local
-  void leave_out_inner_pairs() {                         ///< local
+  void initial_step();                                     ///< takes the loads of a run's setup
+  void integrate();                                        ///< bodies move, and carry their interface granules
+  void change() { change_.make(look_, phase_); }           ///< membership: only place where atoms come and go
+  void take_neighbours();                                  ///< after the engine's exchange, when ghosts are there
+  void note_new_lists() { p_.freezing.note_new_lists(); }  ///< local
+  void leave_out_inner_pairs() {                           ///< local
     if (!p_.freezing.inner_pairs_listed()) return;
     const auto timed = p_.report.time(Part::load);
     p_.freezing.leave_out_inner_pairs();
@@ -85,7 +85,7 @@ class Culling {
 
   // --- what follows the engine's atoms; local
   const std::vector<FollowsAtoms*>& followers() { return p_.followers; }
-  void arrived_from_another_rank(int i) { bed_.shell.is_arriving(i); }
+  void arrived_from_another_rank(int i) { bed_.shell.mark_arriving(i); }
   void was_made(int i) { p_.closure.was_made(i); }  ///< by a fix that inserts, or any other way
   void read_from_file(int i) { p_.cover.forget(i); }
   double* labels() { return bed_.shell.labels(); }

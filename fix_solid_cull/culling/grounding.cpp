@@ -19,7 +19,7 @@ constexpr double no_load = 1e-6;
 
 }  // namespace
 
-void Grounding::goes(int i, StoredGranule&, std::vector<WallLoad>& loads) {
+void Grounding::goes(int i, int&, std::vector<WallLoad>& loads) {
   if (walls_[i].near && bed_.scales.sleeping()) loads = wall_loads_on(i);
 }
 

@@ -13,6 +13,7 @@
 
 namespace solidcull {
 
+/// Which bodies stand on walls, for how long, and what they hand on to them.
 class Grounding : public BodyFollower, public StoreFollower {
  public:
   Grounding(Bed& bed, const BodyMotion& motion, const WallSurvey& walls) : bed_(bed), motion_(motion), walls_(walls) {}
@@ -27,7 +28,7 @@ class Grounding : public BodyFollower, public StoreFollower {
   bool lets_go() const { return !to_let_go_.empty(); }
   /// In each step: walls feel what stored granules press on them. Local.
   void press_on_walls();
-  void goes(int i, StoredGranule& g, std::vector<WallLoad>& loads) override;
+  void goes(int i, int& walls, std::vector<WallLoad>& loads) override;
   void merged(int gone, int kept, bool same_frame) override;
   void grounded_or_let_go(int body) override { forgotten(body); }
   void forgotten(int body) override;

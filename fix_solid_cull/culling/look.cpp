@@ -9,7 +9,7 @@
 namespace solidcull {
 
 void Look::see_walls(bool new_run) {
-  if (new_run) p_.cover.begin_run(p_.walls.a_wall_has_gone());
+  if (new_run) p_.cover.begin_run(p_.walls.take_gone());
   const std::vector<WallContact> contacts = bed_.walls.contacts();
   if (bed_.scales.needs_surface()) p_.cover.close_behind_walls(contacts, [&](int i) { return p_.survey[i].calm > 0; });
   p_.walls.update(contacts, new_run);

@@ -24,7 +24,7 @@ void MembershipChange::free_and_lock() {
 void MembershipChange::lock(int i) {
   Atoms& atoms = bed_.atoms;
   bed_.shell.lock(atoms, i, bed_.run.step, p_.survey[i].normal_load, bed_.scales.sleeping() && p_.survey.stands_at_wall(i));
-  const Survey::Rested rested = p_.survey.rests(i);
+  const Survey::Rested rested = p_.survey.note_lock(i);
   if (rested != Survey::Rested::first_time) bed_.solid.count_locked_again(rested == Survey::Rested::moved);
   if (!bed_.scales.rigid()) {
     atoms.set_velocity(i, Vec3::Zero());
@@ -35,7 +35,7 @@ void MembershipChange::lock(int i) {
 
 void MembershipChange::unlock(int i) {
   bed_.shell.unlock(bed_.atoms, i);
-  p_.survey.wakes(i);
+  p_.survey.note_wake(i);
   p_.closure.unlocked(i);
 }
 
@@ -159,7 +159,7 @@ void MembershipChange::lock_into_body(std::int64_t tag) {
                               rigid ? e.velocity : Vec3(Vec3::Zero()),
                               rigid ? e.spin : Vec3(Vec3::Zero()),
                               e.held};
-  bed_.shell.stands(i, bed_.solid.lock(tag, granule, bed_.masses.by_tag()));
+  bed_.shell.set_place(i, bed_.solid.lock(tag, granule, bed_.masses.by_tag()));
 }
 
 /// From neighbour to neighbour, so that what hangs together becomes one body without many that merge.

@@ -7,7 +7,7 @@
 
 namespace solidcull {
 
-void is_no_number(std::int64_t tag, const char* what, const Vec3& value) {
+void refuse_no_number(std::int64_t tag, const char* what, const Vec3& value) {
   char numbers[96];
   std::snprintf(numbers, sizeof numbers, "%.4g %.4g %.4g", value[0], value[1], value[2]);
   throw RunFailure("the " + std::string(what) + " of granule " + std::to_string(tag) + " is no number (" + numbers +
@@ -18,9 +18,9 @@ void check_numbers(const Atoms& atoms) {
   for (int i = 0; i < atoms.owned; ++i) {
     const Vec3 x = atoms.place(i), v = atoms.velocity(i), w = atoms.spin(i);
     if (std::isfinite(x.sum()) && std::isfinite(v.sum()) && std::isfinite(w.sum())) continue;
-    if (!x.allFinite()) is_no_number(atoms.tag[i], "place", x);
-    if (!v.allFinite()) is_no_number(atoms.tag[i], "velocity", v);
-    if (!w.allFinite()) is_no_number(atoms.tag[i], "spin", w);
+    if (!x.allFinite()) refuse_no_number(atoms.tag[i], "place", x);
+    if (!v.allFinite()) refuse_no_number(atoms.tag[i], "velocity", v);
+    if (!w.allFinite()) refuse_no_number(atoms.tag[i], "spin", w);
   }
 }
 

@@ -10,7 +10,7 @@
 namespace solidcull {
 
 /// RunFailure: this granule's `what` is no number.
-[[noreturn]] void is_no_number(std::int64_t tag, const char* what, const Vec3& value);
+[[noreturn]] void refuse_no_number(std::int64_t tag, const char* what, const Vec3& value);
 /// Places and motions of the owned granules are numbers; else RunFailure. Local.
 void check_numbers(const Atoms& atoms);
 

@@ -99,26 +99,18 @@ std::vector<double> Parcels::pack(const std::vector<std::int64_t>& stored,
   };
   FlatMap<char> named;
   Writer granules;
+  const auto granule = [&](StoredGranule g, double length) {
+    granules.numbers({double(g.tag), double(index_of(g.body)), length});
+    g.each_number([&](auto& x) { granules.number(static_cast<double>(x)); });
+    named[g.tag] = 1;
+  };
   std::vector<double> record;
   for (const std::int64_t tag : stored) {
-    const StoredGranule g = bed_.solid.store().get(tag);
     bed_.solid.store().record(tag, record);
-    granules.numbers({double(g.tag), g.mass, g.radius, double(g.held), double(index_of(g.body))});
-    granules.vector(g.position);
-    granules.number(static_cast<double>(record.size()));
-    granules.numbers({double(g.type), double(g.layout), double(g.lock_step), g.normal_load, double(g.walls)});
-    granules.vector(g.load_change);
+    granule(bed_.solid.store().get(tag), static_cast<double>(record.size()));
     granules.numbers(record.data(), record.size());
-    named[tag] = 1;
   }
-  for (const std::int64_t tag : interface_tags) {
-    const int i = bed_.index.at(tag);
-    const Locked& e = bed_.shell[i];
-    granules.numbers({double(tag), bed_.atoms.mass[i], bed_.atoms.radius[i], double(e.held), double(index_of(e.body))});
-    granules.vector(e.place);
-    granules.number(Parcel::no_record);
-    named[tag] = 1;
-  }
+  for (const std::int64_t tag : interface_tags) granule(bed_.interface_granule(bed_.index.at(tag)), Parcel::no_record);
   Writer edges;
   std::size_t count = 0;
   const auto edge = [&](std::int64_t low, std::int64_t high, const double* history) {
@@ -166,26 +158,11 @@ std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::s
     for (std::size_t k = in.count(); k > 0; --k) {
       Parcel::Granule g;
       g.tag = in.whole();
-      g.mass = in.number();
-      g.radius = in.number();
-      g.held = in.whole() != 0;
       g.body = static_cast<int>(in.below(sender->bodies.size()));
-      g.place = in.vector();
       g.length = static_cast<int>(in.whole());
+      g.each_number([&](auto& x) { x = static_cast<std::decay_t<decltype(x)>>(in.number()); });
       if (g.length != Parcel::no_record) {
-        StoredGranule& s = g.stored;
-        s.tag = g.tag;
-        s.mass = g.mass;
-        s.radius = g.radius;
-        s.position = g.place;
-        s.type = static_cast<int>(in.whole());
-        s.layout = layout[in.below(layout.size())];
-        s.lock_step = in.whole();
-        s.normal_load = in.number();
-        s.walls = static_cast<int>(in.whole());
-        s.held = g.held;
-        s.load_change = in.vector();
-        if (bed_.scales.image_by_place()) s.lock_step = std::min(s.lock_step, StoreExchange::locked_long_ago);
+        g.layout = layout.at(static_cast<std::size_t>(g.layout));
         g.record = in.numbers(static_cast<std::size_t>(g.length));
       }
       p.granules.push_back(g);
@@ -204,6 +181,12 @@ std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::s
 }
 
 // ------------------------------------------------------------------------------------------------------------ as it was
+
+/// A compact store, or one of no places, knows no more of the step.
+StoredGranule Parcels::locked_before(StoredGranule g) const {
+  if (bed_.scales.image_by_place()) g.lock_step = std::min(g.lock_step, StoreExchange::locked_long_ago);
+  return g;
+}
 
 void Parcels::begin_as_it_was(const Sender& sender) {
   bed_.solid.stands_otherwise();
@@ -244,11 +227,11 @@ void Parcels::take_as_it_was(const Parcel& p) {
     const Parcel::Granule& g = p.granules[k];
     const int body = number_.at(static_cast<std::size_t>(g.body));
     if (!g.record) {
-      bed_.solid.take_in(g.tag, body, {g.place, g.radius});
-      bed_.shell.arrives(bed_.index.at(g.tag), {body, g.place});
+      bed_.solid.take_in(g.tag, body, {g.position, g.radius});
+      bed_.shell.arrives(bed_.index.at(g.tag), {body, g.position});
       continue;
     }
-    StoredGranule s = g.stored;
+    StoredGranule s = locked_before(g);
     s.body = body;
     s = bed_.solid.store().rounded(s);
     stored[k] = {s.position, s.radius, s.tag, s.body};
@@ -299,14 +282,14 @@ void Parcels::take_contacts(const Parcel& p, const std::map<std::int64_t, Taken>
 void Parcels::take_granule(std::int64_t tag, const Taken& t) {
   const Parcel::Granule& g = *t.granule;
   const SolidBody& from = t.parcel->sender->bodies.at(g.body);
-  const Vec3 x = from.pose.to_world(g.place);
+  const Vec3 x = from.pose.to_world(g.position);
   const SolidBodies::Place at =
       bed_.solid.lock(tag, {g.mass, g.radius, x, from.twist.at(x), from.twist.spin, g.held}, bed_.masses.by_tag());
   SolidBody& to = bed_.solid.body(at.body);
   to.feel_as(from);
   const int* i = bed_.index.find(tag);
   if (g.record) {
-    StoredGranule s = g.stored;
+    StoredGranule s = locked_before(g);
     s.position = at.position;
     s.body = at.body;
     s.load_change = to.pose.turned_to_frame(from.pose.turned_to_world(s.load_change));
@@ -323,10 +306,10 @@ void Parcels::take(const Parcel* parcels, std::size_t n) {
   for (std::size_t k = 0; k < n; ++k) {
     const Parcel& p = parcels[k];
     for (const Parcel::Granule& g : p.granules) {
-      if (g.record) bed_.solid.know_radius(g.stored.type, g.radius);
+      if (g.record) bed_.solid.know_radius(g.type, g.radius);
       const int* i = bed_.index.find(g.tag);
       const bool here = i && bed_.shell[*i].locked && bed_.shell[*i].body == 0;  // an interface granule of a restart file
-      if (!bed_.solid.bodies().body_of(g.tag) && (here || bed_.ranks.owns(p.sender->bodies.at(g.body).pose.to_world(g.place))))
+      if (!bed_.solid.bodies().body_of(g.tag) && (here || bed_.ranks.owns(p.sender->bodies.at(g.body).pose.to_world(g.position))))
         taken.emplace(g.tag, Taken{&p, &g});
     }
   }

@@ -22,13 +22,8 @@ struct Sender {
 /// Granules and contacts of one rank. What its pointers point to must outlive it.
 struct Parcel {
   static constexpr int no_record = -1;
-  struct Granule {
-    std::int64_t tag;
-    double mass, radius;
-    bool held;
-    int body;    ///< of the sender
-    Vec3 place;  ///< in its frame (m)
-    StoredGranule stored;
+  /// `body` is of the sender.
+  struct Granule : StoredGranule {
     const double* record = nullptr;  ///< of an interior granule; none of an interface granule
     int length = 0;
   };
@@ -42,6 +37,7 @@ struct Parcel {
   std::vector<Edge> edges;
 };
 
+/// The only way in which granules come to a rank that did not lock them.
 class Parcels {
  public:
   Parcels(Bed& bed, Cover& cover) : bed_(bed), cover_(cover) {}
@@ -74,6 +70,7 @@ class Parcels {
     const Parcel* parcel;
     const Parcel::Granule* granule;
   };
+  StoredGranule locked_before(StoredGranule g) const;
   void take_granule(std::int64_t tag, const Taken& t);
   void take_contacts(const Parcel& parcel, const std::map<std::int64_t, Taken>& taken);
 

@@ -16,23 +16,25 @@ std::uint64_t whole(std::int64_t x) { return static_cast<std::uint64_t>(x); }
 
 // columns of the tables
 enum PartColumn { own_lo = 0, own_hi = 3, observer = 6, observed_then = 13, part_columns = 20 };
-enum InterfaceColumn { i_tag, i_body, i_place, i_radius = i_place + 3, i_mass, i_held, interface_columns };
 enum ContactColumn { c_low, c_high, c_body, c_known, c_history };
-enum InteriorColumn {
-  g_tag,
-  g_body,
-  g_place,
-  g_radius = g_place + 3,
-  g_mass,
-  g_type,
-  g_layout,
-  g_step,
-  g_normal,
-  g_change,
-  g_walls = g_change + 3,
-  g_held,
-  g_record
-};
+enum GranuleColumn { g_tag, g_body, g_numbers };
+
+std::uint64_t word(double x) { return bits_of(x); }
+template <class Whole>
+std::uint64_t word(Whole x) {
+  return static_cast<std::uint64_t>(static_cast<std::int64_t>(x));
+}
+void read(double& x, std::uint64_t word) { x = number_of(word); }
+template <class Whole>
+void read(Whole& x, std::uint64_t word) {
+  x = static_cast<Whole>(static_cast<std::int64_t>(word));
+}
+/// Columns of a granule before its record.
+std::size_t granule_columns() {
+  std::size_t n = g_numbers;
+  StoredGranule().each_number([&](auto&) { ++n; });
+  return n;
+}
 
 void put(std::uint64_t* to, const Vec3& v) {
   for (int d = 0; d < 3; ++d) to[d] = bits_of(v[d]);
@@ -90,9 +92,7 @@ std::uint64_t ChunkSource::identity(const Bed& bed) {
 }
 
 bool ChunkSource::next(SectionChunk& chunk) {
-  chunk.rank = static_cast<std::uint64_t>(bed_.ranks.me);
-  chunk.granules = 0;
-  chunk.bytes.clear();
+  chunk.begin(SectionChunk::part, static_cast<std::uint64_t>(bed_.ranks.me), 0);
   if (!part_given_) {
     part(chunk);
     part_given_ = true;
@@ -109,7 +109,6 @@ bool ChunkSource::next(SectionChunk& chunk) {
 }
 
 void ChunkSource::part(SectionChunk& chunk) {
-  chunk.kind = SectionChunk::part;
   WordTable table;
   table.clear(part_columns);
   std::uint64_t* const row = table.add_row();
@@ -117,11 +116,11 @@ void ChunkSource::part(SectionChunk& chunk) {
   put(row + own_hi, bed_.run.own.hi);
   put(row + observer, cover_.observer());
   put(row + observed_then, cover_.observed_then());
-  pack_columns(table, chunk.bytes);
+  chunk.append(table);
   table.clear(1);
   for (int l = 0; l < bed_.atoms.layouts(); ++l)
     for (const char c : bed_.atoms.layout_text(l) + "\n") *table.add_row() = static_cast<unsigned char>(c);
-  pack_columns(table, chunk.bytes);
+  chunk.append(table);
   std::vector<double> numbers;
   table.clear(0);
   for (const auto& body : bed_.solid.bodies().bodies()) {
@@ -131,13 +130,13 @@ void ChunkSource::part(SectionChunk& chunk) {
     if (table.rows == 0) table.clear(numbers.size());
     std::transform(numbers.begin(), numbers.end(), table.add_row(), bits_of);
   }
-  pack_columns(table, chunk.bytes);
+  chunk.append(table);
 }
 
 void ChunkSource::begin_block() {
   contacts_before_ += contacts_.rows;
   contacts_.clear(c_history + bed_.solid.contacts().width());
-  granules_.clear(interface_columns);
+  granules_.clear(granule_columns());
   by_length_.clear();
 }
 
@@ -181,61 +180,49 @@ void ChunkSource::contacts_of(std::int64_t tag) {
   });
 }
 
+/// Returns where its record goes.
+std::uint64_t* ChunkSource::granule(WordTable& table, StoredGranule g) const {
+  std::uint64_t* const row = table.add_row();
+  row[g_tag] = whole(g.tag);
+  row[g_body] = static_cast<std::uint64_t>(std::lower_bound(bodies_.begin(), bodies_.end(), g.body) - bodies_.begin());
+  std::uint64_t* at = row + g_numbers;
+  g.each_number([&](auto& x) { *at++ = word(x); });
+  return at;
+}
+
 void ChunkSource::interface_block(SectionChunk& chunk) {
   begin_block();
   const Atoms& atoms = bed_.atoms;
   for (; atom_ < atoms.owned && granules_.rows < granules_per_chunk; ++atom_) {
-    const Locked& e = bed_.shell[atom_];
-    if (!e.locked) continue;
-    std::uint64_t* const row = granules_.add_row();
-    row[i_tag] = whole(atoms.tag[atom_]);
-    row[i_body] = static_cast<std::uint64_t>(std::lower_bound(bodies_.begin(), bodies_.end(), e.body) - bodies_.begin());
-    put(row + i_place, e.place);
-    row[i_radius] = bits_of(atoms.radius[atom_]);
-    row[i_mass] = bits_of(atoms.mass[atom_]);
-    row[i_held] = e.held;
+    if (!bed_.shell[atom_].locked) continue;
+    granule(granules_, bed_.interface_granule(atom_));
     contacts_of(atoms.tag[atom_]);
   }
   if (granules_.rows == 0) return;
-  chunk.kind = SectionChunk::interface_granules;
-  chunk.granules = granules_.rows;
+  chunk.begin(SectionChunk::interface_granules, chunk.rank, granules_.rows);
   interface_ += granules_.rows;
-  pack_columns(granules_, chunk.bytes);
-  pack_columns(contacts_, chunk.bytes);
+  chunk.append(granules_);
+  chunk.append(contacts_);
 }
 
 void ChunkSource::interior_block(SectionChunk& chunk) {
   begin_block();
+  std::uint64_t granules = 0;
   const auto add = [&](const StoredGranule& g, const std::uint64_t* record, int length) {
     WordTable& table = by_length_[length];
-    if (table.rows == 0) table.clear(static_cast<std::size_t>(g_record + length));
-    std::uint64_t* const row = table.add_row();
-    row[g_tag] = whole(g.tag);
-    row[g_body] = static_cast<std::uint64_t>(std::lower_bound(bodies_.begin(), bodies_.end(), g.body) - bodies_.begin());
-    put(row + g_place, g.position);
-    row[g_radius] = bits_of(g.radius);
-    row[g_mass] = bits_of(g.mass);
-    row[g_type] = whole(g.type);
-    row[g_layout] = whole(g.layout);
-    row[g_step] = whole(g.lock_step);
-    row[g_normal] = bits_of(g.normal_load);
-    put(row + g_change, g.load_change);
-    row[g_walls] = whole(g.walls);
-    row[g_held] = g.held;
-    std::copy(record, record + length, row + g_record);
+    if (table.rows == 0) table.clear(granule_columns() + static_cast<std::size_t>(length));
+    std::copy(record, record + length, granule(table, g));
     contacts_of(g.tag);
-    ++chunk.granules;
+    ++granules;
   };
   slot_ = bed_.solid.store().visit_some(slot_, granules_per_chunk, add);
-  if (chunk.granules == 0) return;
-  chunk.kind = SectionChunk::interior_granules;
-  interior_ += chunk.granules;
-  pack_columns(granules_, chunk.bytes);
-  pack_columns(contacts_, chunk.bytes);
-  const std::uint64_t tables = by_length_.size();
-  const auto* const bytes = reinterpret_cast<const char*>(&tables);
-  chunk.bytes.insert(chunk.bytes.end(), bytes, bytes + sizeof tables);
-  for (const auto& table : by_length_) pack_columns(table.second, chunk.bytes);
+  if (granules == 0) return;
+  chunk.begin(SectionChunk::interior_granules, chunk.rank, granules);
+  interior_ += granules;
+  chunk.append(granules_);
+  chunk.append(contacts_);
+  chunk.append(by_length_.size());
+  for (const auto& table : by_length_) chunk.append(table.second);
 }
 
 // ------------------------------------------------------------------------------------------------------------ in
@@ -282,17 +269,7 @@ const Parcel& ChunkReader::parcel(const SectionChunk& chunk) {
   parcel_.sender = head_.sender;
   parcel_.granules.clear();
   at = unpack_columns(at, end, interface_);
-  for (std::size_t r = 0; r < interface_.rows; ++r) {
-    const std::uint64_t* const row = interface_.row(r);
-    Parcel::Granule g;
-    g.tag = static_cast<std::int64_t>(row[i_tag]);
-    g.body = static_cast<int>(index_below(row[i_body], head_.sender->bodies.size()));
-    g.place = vector_of(row + i_place);
-    g.radius = number_of(row[i_radius]);
-    g.mass = number_of(row[i_mass]);
-    g.held = row[i_held] != 0;
-    parcel_.granules.push_back(g);
-  }
+  read_granules(interface_, nullptr);
   at = unpack_columns(at, end, contacts_);
   read_contacts(contacts_);
   if (chunk.kind == SectionChunk::interior_granules) {
@@ -303,7 +280,8 @@ const Parcel& ChunkReader::parcel(const SectionChunk& chunk) {
     records_.resize(index_below(tables, chunk.bytes.size()));
     for (std::vector<double>& numbers : records_) {
       at = unpack_columns(at, end, interior_);
-      read_interior(interior_, numbers);
+      numbers_of(interior_, numbers);
+      read_granules(interior_, numbers.data());
     }
   }
   if (parcel_.granules.size() != chunk.granules) throw InternalError("a chunk of a restart file misses granules");
@@ -324,34 +302,22 @@ void ChunkReader::read_contacts(const WordTable& table) {
   }
 }
 
-void ChunkReader::read_interior(const WordTable& table, std::vector<double>& numbers) {
-  if (table.columns < g_record) throw InternalError("a chunk of a restart file has no granules");
-  const int length = static_cast<int>(table.columns - g_record);
-  numbers_of(table, numbers);
+/// numbers: the table's, of interior granules; none of interface granules.
+void ChunkReader::read_granules(const WordTable& table, const double* numbers) {
+  const std::size_t begin = granule_columns();
+  if (table.rows && table.columns < begin) throw InternalError("a chunk of a restart file has no granules");
   for (std::size_t r = 0; r < table.rows; ++r) {
     const std::uint64_t* const row = table.row(r);
     Parcel::Granule g;
     g.tag = static_cast<std::int64_t>(row[g_tag]);
     g.body = static_cast<int>(index_below(row[g_body], head_.sender->bodies.size()));
-    g.place = vector_of(row + g_place);
-    g.radius = number_of(row[g_radius]);
-    g.mass = number_of(row[g_mass]);
-    g.held = row[g_held] != 0;
-    StoredGranule& s = g.stored;
-    s.tag = g.tag;
-    s.position = g.place;
-    s.radius = g.radius;
-    s.mass = g.mass;
-    s.type = static_cast<int>(row[g_type]);
-    s.layout = layout_[index_below(row[g_layout], layout_.size())];
-    s.lock_step = static_cast<std::int64_t>(row[g_step]);
-    if (bed_.scales.image_by_place()) s.lock_step = std::min(s.lock_step, StoreExchange::locked_long_ago);
-    s.normal_load = number_of(row[g_normal]);
-    s.load_change = vector_of(row + g_change);
-    s.walls = static_cast<int>(row[g_walls]);
-    s.held = g.held;
-    g.record = numbers.data() + r * table.columns + g_record;
-    g.length = length;
+    const std::uint64_t* at = row + g_numbers;
+    g.each_number([&](auto& x) { read(x, *at++); });
+    if (numbers) {
+      g.layout = layout_[index_below(static_cast<std::uint64_t>(g.layout), layout_.size())];
+      g.record = numbers + r * table.columns + begin;
+      g.length = static_cast<int>(table.columns - begin);
+    }
     parcel_.granules.push_back(g);
   }
 }

@@ -29,6 +29,7 @@ class ChunkSource {
   void part(SectionChunk& chunk);
   void interface_block(SectionChunk& chunk);
   void interior_block(SectionChunk& chunk);
+  std::uint64_t* granule(WordTable& table, StoredGranule g) const;
   void begin_block();
   void contacts_of(std::int64_t tag);
   void contact(std::int64_t low, std::int64_t high, const double* history);
@@ -60,7 +61,7 @@ class ChunkReader {
 
  private:
   void read_contacts(const WordTable& table);
-  void read_interior(const WordTable& table, std::vector<double>& numbers);
+  void read_granules(const WordTable& table, const double* numbers);
 
   const Bed& bed_;
   Head head_;

@@ -117,7 +117,7 @@ class Shell : public FollowsAtoms {
   /// As it was, on this rank.
   void put(int i, const Locked& e) { changed(i) = e; }
   /// Body and place, as locking gives them, or as they are after a split or a merge.
-  void stands(int i, const SolidBodies::Place& at) {
+  void set_place(int i, const SolidBodies::Place& at) {
     Locked& e = changed(i);
     e.body = at.body;
     e.place = at.position;
@@ -143,14 +143,14 @@ class Shell : public FollowsAtoms {
     e.body = Locked::arriving;
   }
   /// The engine brought it from another rank.
-  void is_arriving(int i) {
+  void mark_arriving(int i) {
     if (rows_[i].locked) changed(i).body = Locked::arriving;
   }
   /// It has come from another rank or a file: loads turn from the world to the frame of its body.
   void arrives(int i, const SolidBodies::Place& at) {
     Locked& e = rows_[i];
     const Pose& pose = bodies_.pose(at.body);
-    stands(i, at);
+    set_place(i, at);
     e.reference = pose.turned_to_frame(e.reference);
     e.load_change = pose.turned_to_frame(e.load_change);
   }

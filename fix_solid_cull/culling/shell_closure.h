@@ -28,6 +28,7 @@ struct Cleared {
   static Cleared unpack(const double*) { return {}; }
 };
 
+/// Keeps what it knows of who is far from what is stored, so that most of it is not asked again. Writes Cleared.
 class ShellClosure : public BodyFollower {
  public:
   ShellClosure(Bed& bed, const WallSurvey& walls, StoreExchange& exchange) : bed_(bed), walls_(walls), exchange_(exchange) {}
@@ -47,7 +48,7 @@ class ShellClosure : public BodyFollower {
 
   /// A run begins: walls may be others, and stored granules at them are atoms until they are seen to rest.
   void begin_run(bool other_walls) { new_run_ = walls_unfelt_ = other_walls; }
-  void run_begun() { new_run_ = false; }
+  void end_setup() { new_run_ = false; }
   /// Whether what came out for that has not felt its walls yet: it is about to.
   bool take_walls_unfelt() { return std::exchange(walls_unfelt_, false); }
 

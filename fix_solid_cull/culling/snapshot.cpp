@@ -12,7 +12,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261127;  // the format's version
+constexpr double file_mark = 20261128;  // the format's version
 /// The numbers in the file's head. The largest stored radius of each type and a check sum follow them.
 enum Header {
   mark,
@@ -179,7 +179,7 @@ void Snapshot::take_up() {
 /// Whether this rank holds what is in the parcel.
 bool Snapshot::holds(const Parcel& p) const {
   return std::all_of(p.granules.begin(), p.granules.end(), [&](const Parcel::Granule& g) {
-    return g.record ? bed_.ranks.owns(p.sender->bodies.at(static_cast<std::size_t>(g.body)).pose.to_world(g.place))
+    return g.record ? bed_.ranks.owns(p.sender->bodies.at(static_cast<std::size_t>(g.body)).pose.to_world(g.position))
                     : bed_.index.contains(g.tag);
   });
 }

@@ -13,6 +13,7 @@
 
 namespace solidcull {
 
+/// Writes the file's state, and reads it back: as it was, where each rank has what it wrote, else to whoever owns it now.
 class Snapshot {
  public:
   Snapshot(Bed& bed, Parcels& parcels, EffectiveGravity& gravity, const Cover& cover)

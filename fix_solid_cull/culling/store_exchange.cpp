@@ -38,7 +38,7 @@ void StoreExchange::relocate(int i, const Vec3& place) {
   const Vec3 by = bed_.solid.bodies().pose(e.body).turned_to_world(place - e.place);
   bed_.solid.count_refilled(-atoms.mass[i] * bed_.run.gravity().dot(by));
   bed_.solid.relocate(e.body, {atoms.mass[i], e.place, atoms.radius[i], e.held}, place);
-  bed_.shell.stands(i, {e.body, place});
+  bed_.shell.set_place(i, {e.body, place});
   atoms.set_place(i, atoms.place(i) + by);
 }
 
@@ -52,20 +52,10 @@ void StoreExchange::put_away(int i) {
   bed_.contacts.clear_histories(i);
   if (bed_.scales.image_by_place()) atoms.wrap(i);  // the box and the place tell which image: no word is kept for it
   std::vector<double> record;
-  StoredGranule g;
+  StoredGranule g = bed_.interface_granule(i);
   atoms.pack(i, record, g.layout);
-  g.position = e.place;
-  g.body = e.body;
-  g.radius = atoms.radius[i];
-  g.mass = atoms.mass[i];
-  g.tag = atoms.tag[i];
-  g.type = atoms.type[i];
-  g.lock_step = e.lock_step;
-  g.load_change = e.load_change;
-  g.normal_load = e.normal_load;
-  g.held = e.held;
   std::vector<WallLoad> loads;
-  for (StoreFollower* f : followers_) f->goes(i, g, loads);
+  for (StoreFollower* f : followers_) f->goes(i, g.walls, loads);
   const std::int64_t now = bed_.run.step;
   if (bed_.scales.image_by_place()) {
     g = bed_.solid.as_stored(g);

@@ -13,8 +13,8 @@ namespace solidcull {
 class StoreFollower {
  public:
   virtual ~StoreFollower() = default;
-  /// Interface granule i is about to go: what the store is to know of it, and the loads of walls that it bears.
-  virtual void goes(int /*i*/, StoredGranule& /*g*/, std::vector<WallLoad>& /*loads*/) {}
+  /// Interface granule i is about to go: how many walls it touches, and the loads of walls that it bears.
+  virtual void goes(int /*i*/, int& /*walls*/, std::vector<WallLoad>& /*loads*/) {}
   /// It has come back as atom i, at this place of the world (m).
   virtual void came_back(int /*i*/, const StoredGranule& /*g*/, const Vec3& /*x*/) {}
 };

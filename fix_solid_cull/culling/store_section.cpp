@@ -144,10 +144,7 @@ bool SectionReader::head(SectionChunk& chunk) {
   std::copy(words.begin(), words.begin() + 4, head_);
   size_ = words[3];
   sum_ = words[4];
-  chunk.kind = words[0];
-  chunk.rank = words[1];
-  chunk.granules = words[2];
-  chunk.bytes.clear();
+  chunk.begin(words[0], words[1], words[2]);
   return true;
 }
 

@@ -14,12 +14,12 @@
 //   one column: the characters of the texts of column layouts, one line each, in the order of their numbers;
 //   one row for each body of the rank: its numbers, as doubles, in the order of SolidBody::each_number().
 // Tables of granules:
-//   interface granules: tag, body (its row in the part), place (3, m, frame of the body), radius, mass, held;
+//   interface granules: tag, body (its row in the part), their numbers in the order of StoredGranule::each_number(), the whole
+//     ones and flags as whole numbers;
 //   contacts: the lower tag, the higher one, body in whose frame the history is, whether it has a history, the history as the
 //     lower tag sees it;
-//   how many further tables follow (one word), each of interior granules whose engine records are equally long: tag, body, place
-//     (3), radius, mass, type, number of the layout, step of locking, normal load (N), load change (3, N, frame of the body),
-//     walls, held, the record. Tag, body, type, layout, step, walls and held are whole numbers.
+//   how many further tables follow (one word), each of interior granules whose engine records are equally long: the same, and
+//     the record.
 // A contact stands with the one of its granules that comes later in this rank's chunks, or with the one that is on this rank; a
 // contact across ranks stands with either rank.
 #pragma once
@@ -38,6 +38,18 @@ struct SectionChunk {
   enum Kind : std::uint64_t { part = 1, interface_granules, interior_granules };
   std::uint64_t kind = part, rank = 0, granules = 0;
   std::vector<char> bytes;
+
+  void begin(std::uint64_t of_kind, std::uint64_t of_rank, std::uint64_t so_many) {
+    kind = of_kind;
+    rank = of_rank;
+    granules = so_many;
+    bytes.clear();
+  }
+  void append(const WordTable& table) { pack_columns(table, bytes); }
+  void append(std::uint64_t word) {
+    const auto* const as_bytes = reinterpret_cast<const char*>(&word);
+    bytes.insert(bytes.end(), as_bytes, as_bytes + sizeof word);
+  }
 };
 
 struct SectionCounts {

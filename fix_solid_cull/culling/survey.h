@@ -60,6 +60,7 @@ struct AtRest {
   }
 };
 
+/// Sees at each look who is in solid state, for how many looks, and proposes what is to be culled. Writes AtRest.
 class Survey {
  public:
   Survey(const Bed& bed, const BodyMotion& motion, const WallSurvey& walls) : bed_(bed), motion_(motion), walls_(walls) {}
@@ -68,14 +69,14 @@ class Survey {
   PerGranule<AtRest>& rows() { return rows_; }
   bool stands_at_wall(int i) const { return walls_[i].stands; }
   /// Owned granule i is free again.
-  void wakes(int i) {
+  void note_wake(int i) {
     begin_anew(i);
     rows_[i].woken = true;
     rows_[i].woke_at = bed_.atoms.place(i);
   }
   /// It is locked; if it had been before: whether it has moved by more than d/100 since, where nothing carries it along.
   enum class Rested { first_time, unmoved, moved };
-  Rested rests(int i) {
+  Rested note_lock(int i) {
     begin_anew(i);
     if (!rows_[i].woken) return Rested::first_time;
     rows_[i].woken = false;

@@ -4,7 +4,7 @@
 
 namespace solidcull {
 
-bool WallSurvey::a_wall_has_gone() {
+bool WallSurvey::take_gone() {
   std::vector<std::string> now = bed_.walls.names();
   const bool gone = !std::includes(now.begin(), now.end(), names_then_.begin(), names_then_.end());
   names_then_ = std::move(now);

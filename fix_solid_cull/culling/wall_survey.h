@@ -44,7 +44,7 @@ class WallSurvey : public StoreFollower {
 
   const AtWall& operator[](int i) const { return rows_[i]; }
   PerGranule<AtWall>& rows() { return rows_; }
-  void goes(int i, StoredGranule& g, std::vector<WallLoad>&) override { g.walls = rows_[i].touched; }
+  void goes(int i, int& walls, std::vector<WallLoad>&) override { walls = rows_[i].touched; }
   void came_back(int i, const StoredGranule& g, const Vec3&) override {
     rows_.reset(i);
     rows_[i].touched = g.walls;
@@ -53,7 +53,7 @@ class WallSurvey : public StoreFollower {
   /// At a look. Interface granules wake whose wall has gone: at the start of a run any, within a run one that can move.
   void update(const std::vector<WallContact>& contacts, bool new_run);
   /// At the start of a run: whether a wall of the run before is not there any more.
-  bool a_wall_has_gone();
+  bool take_gone();
   /// A run has ended.
   void remember_walls() { fingerprint_ = fingerprint(); }
   /// Whether walls that stand still may be others than at the end of the last run, on any rank. Collective.

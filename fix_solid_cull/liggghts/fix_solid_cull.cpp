@@ -157,12 +157,12 @@ void FixSolidCull::setup_pre_exchange() {
 }
 
 void FixSolidCull::setup_pre_force(int vflag) {
-  guarded([&] { culling_->lists_are_new(); });
+  guarded([&] { culling_->note_new_lists(); });
   pre_force(vflag);
 }
 
 void FixSolidCull::setup(int) {
-  hand_on([&] { culling_->is_set_up(); });
+  hand_on([&] { culling_->end_setup(); });
 }
 
 // ------------------------------------------------------------------------------------------------------------ a time step

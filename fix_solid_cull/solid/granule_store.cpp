@@ -4,6 +4,7 @@
 #include <cstring>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 #include "bits.h"
 
@@ -12,13 +13,8 @@ namespace {
 
 constexpr std::uint32_t empty_entry = UINT32_MAX;
 
-/// Two ints in one word.
-std::uint64_t pair_of(int low, int high) {
-  return static_cast<std::uint64_t>(static_cast<std::uint32_t>(high)) << 32 | static_cast<std::uint32_t>(low);
-}
-
 /// As the engine packs it.
-std::uint64_t tag_word(std::int64_t tag) { return static_cast<std::uint64_t>(tag); }
+std::uint64_t word_of_tag(std::int64_t tag) { return static_cast<std::uint64_t>(tag); }
 
 /// Four numbers in one word.
 std::uint64_t word_of(const std::array<double, 4>& numbers) {
@@ -78,16 +74,23 @@ StoredGranule GranuleStore::rounded(StoredGranule granule) const {
   return granule;
 }
 
-auto GranuleStore::head_of_row(const StoredGranule& g) const -> Head {
-  Head head{tag_word(g.tag), bits_of(g.radius), bits_of(g.mass), pair_of(g.type, g.layout),
-            static_cast<std::uint64_t>(g.lock_step)};
+auto GranuleStore::head_of_row(StoredGranule g) const -> Head {
+  Head head{};
+  head[tag_word] = word_of_tag(g.tag);
+  head[radius_word] = bits_of(g.radius);
+  head[mass_word] = bits_of(g.mass);
+  head[step_word] = static_cast<std::uint64_t>(g.lock_step);
   if (precision_ == Precision::exact) {
-    head[5] = bits_of(g.normal_load);
-    for (int d = 0; d < 3; ++d) head[6 + d] = bits_of(g.load_change[d]);
+    head[normal_load_word] = bits_of(g.normal_load);
+    for (int d = 0; d < 3; ++d) head[load_change_word + d] = bits_of(g.load_change[d]);
   } else {
-    head[5] = word_of({g.normal_load, g.load_change[0], g.load_change[1], g.load_change[2]});
+    head[normal_load_word] = word_of({g.normal_load, g.load_change[0], g.load_change[1], g.load_change[2]});
   }
-  head[9] = pair_of(g.walls, g.held);
+  int k = 0;
+  g.each_small([&](auto& x) {
+    head[small_words + k / 2] |= static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32 * (k % 2);
+    ++k;
+  });
   return head;
 }
 
@@ -168,34 +171,35 @@ Resident GranuleStore::resident(int s) const {
 
 StoredGranule GranuleStore::granule(int s) const {
   std::uint64_t row[record_begin];
-  row[0] = tag_word(tag_at(s));
+  row[tag_word] = word_of_tag(tag_at(s));
   rows_.get(row_at(s), row, record_begin);
   StoredGranule g;
   g.position = position(s);
-  g.radius = number_of(row[1]);
-  g.mass = number_of(row[2]);
+  g.radius = number_of(row[radius_word]);
+  g.mass = number_of(row[mass_word]);
   g.tag = tag_at(s);
-  g.type = static_cast<int>(row[3] & UINT32_MAX);
   g.body = body_at(s);
-  g.layout = static_cast<int>(row[3] >> 32);
-  g.lock_step = static_cast<std::int64_t>(row[4]);
+  g.lock_step = static_cast<std::int64_t>(row[step_word]);
   if (precision_ == Precision::exact) {
-    g.normal_load = number_of(row[5]);
-    g.load_change = Vec3(number_of(row[6]), number_of(row[7]), number_of(row[8]));
+    g.normal_load = number_of(row[normal_load_word]);
+    for (int d = 0; d < 3; ++d) g.load_change[d] = number_of(row[load_change_word + d]);
   } else {
-    const auto loads = numbers_of(row[5]);
+    const auto loads = numbers_of(row[normal_load_word]);
     g.normal_load = loads[0];
     g.load_change = Vec3(loads[1], loads[2], loads[3]);
   }
-  g.walls = static_cast<int>(row[9] & UINT32_MAX);
-  g.held = row[9] >> 32 & 1;
+  int k = 0;
+  g.each_small([&](auto& x) {
+    x = static_cast<std::decay_t<decltype(x)>>(static_cast<std::uint32_t>(row[small_words + k / 2] >> 32 * (k % 2)));
+    ++k;
+  });
   return g;
 }
 
 std::vector<std::uint64_t> GranuleStore::row_of(int s) const {
   const int length = rows_.length(row_at(s));
   std::vector<std::uint64_t> row(static_cast<std::size_t>(length));
-  row[0] = tag_word(tag_at(s));
+  row[tag_word] = word_of_tag(tag_at(s));
   rows_.get(row_at(s), row.data(), length);
   return row;
 }

@@ -17,23 +17,9 @@
 #include "packed_rows.h"
 #include "sites.h"
 #include "sphere.h"
+#include "stored_granule.h"
 
 namespace solidcull {
-
-/// What the core must know of an interior granule. SI units, in the frame of its body.
-struct StoredGranule {
-  Vec3 position = Vec3::Zero();
-  double radius = 0, mass = 0;
-  std::int64_t tag = 0;
-  int type = 0;
-  int body = 0;
-  int layout = 0;                   ///< which columns its record has; the adapter knows them
-  std::int64_t lock_step = 0;       ///< time step at which it was locked
-  double normal_load = 0;           ///< sum of its normal contact forces at locking (N)
-  Vec3 load_change = Vec3::Zero();  ///< F_ext - F_ext(at locking) that it carried when it went in (N): kept for invariant I5
-  int walls = 0;                    ///< walls and triangles that it touched when it was put away
-  bool held = false;                ///< it touches a wall that stands still
-};
 
 /// What questions of place see of a stored granule; get() has the rest.
 struct Resident {
@@ -219,9 +205,18 @@ class GranuleStore {
  private:
   static constexpr int none = -1;
   static constexpr std::int32_t free_mark = INT32_MIN;
-  /// A granule's row: what head_of_row() says, then its engine record; its tail stands behind. Tag, radius and mass come first,
-  /// as key words.
-  static constexpr int record_begin = 10;
+  /// A granule's row: its head, then its engine record; its tail stands behind. Tag, radius and mass come first, as key words;
+  /// small numbers stand in pairs.
+  enum Word {
+    tag_word,
+    radius_word,
+    mass_word,
+    step_word,
+    normal_load_word,
+    load_change_word,
+    small_words = load_change_word + 3
+  };
+  static constexpr int record_begin = small_words + (SmallNumbers::count() + 1) / 2;
   using Head = std::array<std::uint64_t, record_begin>;
   /// The words of a slot: 44, 36 or 28 bytes.
   enum Field {
@@ -358,7 +353,7 @@ class GranuleStore {
   }
   bool is_taken(int frame, const Vec3& site) const;
   Resident resident(int s) const;
-  Head head_of_row(const StoredGranule& g) const;
+  Head head_of_row(StoredGranule g) const;
   std::vector<std::uint64_t> row_of(int s) const;
   Vec3 rounded(const Vec3& place, double radius) const;
   StoredGranule granule(int s) const;

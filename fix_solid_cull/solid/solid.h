@@ -150,7 +150,7 @@ class Solid {
     changed(body, {to, granule.radius});
   }
   /// It stands in another body from here on, or in another frame of its own.
-  void stands(int body, const Sphere& granule) { changed(body, granule); }
+  void tell_granule(int body, const Sphere& granule) { changed(body, granule); }
   /// So many granules are about to be put away. If they are many beside what is stored, a bed comes to rest, and an exact store
   /// packs their contacts. Few are what a wave woke and will wake again: theirs stay in the graph. What is packed, or is not,
   /// stays so.

@@ -986,10 +986,10 @@ void SmallWorld::begin_run(Culling* culling) {
   borders();
   if (culling) culling->take_neighbours();
   contacts.build();
-  if (culling) culling->lists_are_new();
+  if (culling) culling->note_new_lists();
   if (culling) culling->leave_out_inner_pairs();
   compute_forces();
-  if (culling) culling->is_set_up();
+  if (culling) culling->end_setup();
 }
 
 void SmallWorld::step(Culling* culling) {

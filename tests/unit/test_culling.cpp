@@ -322,10 +322,10 @@ TEST(Culling, the_beginning_of_a_run_out_of_order_is_an_internal_error) {
   SmallWorld world(Column::deck());
   Column column(world);
   EXPECT_THROW(column.culling.set_up_atoms(), InternalError);
-  EXPECT_THROW(column.culling.is_set_up(), InternalError);
+  EXPECT_THROW(column.culling.end_setup(), InternalError);
   world.begin_run(&column.culling);
   EXPECT_THROW(column.culling.set_up_atoms(), InternalError);
-  EXPECT_THROW(column.culling.is_set_up(), InternalError);
+  EXPECT_THROW(column.culling.end_setup(), InternalError);
   world.steps(&column.culling, 2);
   EXPECT_THROW(column.culling.set_up_atoms(), InternalError);
 }

@@ -296,11 +296,11 @@ TEST(WallSurvey, a_wall_that_stays_wakes_nobody) {
   bed.parts.walls.update(bed.world.walls.contacts(), true);
   bed.parts.walls.update(bed.world.walls.contacts(), false);
   EXPECT_FALSE(bed.parts.wake.any_here());
-  EXPECT_FALSE(bed.parts.walls.a_wall_has_gone());  // the first time: nothing to compare with
+  EXPECT_FALSE(bed.parts.walls.take_gone());  // the first time: nothing to compare with
   bed.world.deck.planes.push_back(SmallDeck::ground(-1, "another"));
-  EXPECT_FALSE(bed.parts.walls.a_wall_has_gone());
+  EXPECT_FALSE(bed.parts.walls.take_gone());
   bed.world.deck.planes.erase(bed.world.deck.planes.begin());
-  EXPECT_TRUE(bed.parts.walls.a_wall_has_gone());
+  EXPECT_TRUE(bed.parts.walls.take_gone());
 }
 
 }  // namespace

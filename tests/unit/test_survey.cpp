@@ -258,7 +258,7 @@ TEST(Survey, who_woke_and_stands_where_it_stood_must_be_calm_for_half_as_long) {
   bed.row(5, 2, Vec3(0, 0.1, 0));        // woke and has moved since, by 0.4 % of d
   bed.row(7, 2, Vec3(0, 0.15, 0), 0.1);  // woke, stands, and is hardly pressed: twice the half
   bed.begin();
-  for (int tag = 3; tag <= 8; ++tag) bed.parts.survey.wakes(bed.world.at(tag));
+  for (int tag = 3; tag <= 8; ++tag) bed.parts.survey.note_wake(bed.world.at(tag));
   for (const int tag : {5, 6}) {
     const int i = bed.world.at(tag);
     bed.world.atoms.set_place(i, bed.world.atoms.place(i) + Vec3(0, 0, 0.004 * 2 * r));

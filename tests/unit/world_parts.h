@@ -32,7 +32,7 @@ struct WorldParts : CullingParts {
     for (FollowsAtoms* f : followers) f->grow(world.atoms.room);
     for (FollowsAtoms* f : followers)
       for (int i = 0; i < world.atoms.owned; ++i) f->reset(i);
-    world.on_arrival = [this](int i) { bed.shell.is_arriving(i); };
+    world.on_arrival = [this](int i) { bed.shell.mark_arriving(i); };
     bed.solid.set_histories(bed.contacts.flips(), bed.contacts.vectors());
     Vec3 periods = world.run.edges();
     for (int k = 0; k < 3; ++k)
