@@ -135,6 +135,8 @@ std::vector<double> Snapshot::from_bytes(const char* bytes) {
   return state;
 }
 
+std::int64_t Snapshot::interior_of(const std::vector<double>& state) { return static_cast<std::int64_t>(state[1 + interior]); }
+
 void Snapshot::read(const std::vector<double>& state, const std::string& file) {
   state_.assign(state.begin() + 1, state.end() - check_sum_size);
   file_ = file;
