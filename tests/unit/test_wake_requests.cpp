@@ -69,7 +69,7 @@ TEST(WakeRequests, balls_are_larger_where_many_wake_beside_each_other_on_whateve
     if (w.ranks.me == 0) {
       wake.ask_by_load(front, 0.011);
       wake.ask_by_load(front - Vec3(2.5 * d, 0, 0), 0.012);
-      wake.ask_by_load(Vec3(0.1, 1, 1), 0.013);            // alone
+      wake.ask_by_load(Vec3(0.1, 1, 1), 0.013);                  // alone
       for (int k = 0; k < 9; ++k) wake.ask(Vec3(0.1, 1, 1), d);  // not by their loads
     } else {
       wake.ask_by_load(front + Vec3(0, d, 0), 0.014);
