@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs clang-tidy with the checks of .clang-tidy; any finding is an error. It installs clang-tidy where that is missing.
 #   scripts/tidy.sh [FILE...]      default: every source file of the project
-#   scripts/tidy.sh --changed      those that differ from main: where this branch left it, and what is not committed
+#   scripts/tidy.sh --changed [COMMIT]   those that differ from COMMIT, default: from main, where this branch left it
 # Exit 77: --changed without git's history.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -10,8 +10,8 @@ cd "$root"
 
 folders="fix_solid_cull region_interface_mesh tests/unit tests/decks benchmarks"
 if [ "${1:-}" = --changed ]; then
-  if ! base=$(git merge-base HEAD origin/main 2>/dev/null || git merge-base HEAD main 2>/dev/null); then
-    echo "tidy: no git history here that has a main: what has changed is not known" >&2
+  if ! base=$(git merge-base HEAD "${2:-origin/main}" 2>/dev/null || git merge-base HEAD "${2:-main}" 2>/dev/null); then
+    echo "tidy: no git history here that has ${2:-a main}: what has changed is not known" >&2
     exit 77
   fi
   differ=$(git diff --name-only --diff-filter=d "$base" -- $folders)
