@@ -10,11 +10,11 @@
 extern "C" {
 #endif
 
-/* Makes `fix … solid/cull` known to this instance before its first fix is made. A program that has loaded this library too late
+/** Makes `fix … solid/cull` known to this instance before its first fix is made. A program that has loaded this library too late
    reads why then, instead of "Invalid fix style". lammps: what lammps_open gave, or a LAMMPS*. Local. */
 void solidcull_register(void* lammps);
 
-/* The version, as "major.minor.patch". */
+/** The version, as "major.minor.patch". */
 const char* solidcull_version(void);
 
 #ifdef __cplusplus

@@ -1,14 +1,28 @@
 #!/usr/bin/env bash
 # Runs clang-tidy with the checks of .clang-tidy; any finding is an error. It installs clang-tidy where that is missing.
 #   scripts/tidy.sh [FILE...]      default: every source file of the project
+#   scripts/tidy.sh --changed [COMMIT]   those that differ from COMMIT, default: from main, where this branch left it
+# Exit 77: --changed without git's history.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
-SOLIDCULL_PACKAGES="clang-tidy libbenchmark-dev" SOLIDCULL_BUILD=$root/build-tidy SOLIDCULL_CMAKE=-DSOLIDCULL_BENCHMARKS=ON \
-  "$root/scripts/prepare.sh" --configure
-if [ $# -eq 0 ]; then
-  mapfile -t files < <(cd "$root" && find fix_solid_cull region_interface_mesh tests benchmarks -name '*.cpp' | sort)
-  set -- "${files[@]/#/$root/}"
+[ $# -eq 0 ] || [ "$1" = --changed ] || mapfile -t files < <(realpath -- "$@")
+cd "$root"
+
+folders="fix_solid_cull region_interface_mesh tests/unit tests/decks benchmarks"
+if [ "${1:-}" = --changed ]; then
+  if ! base=$(git merge-base HEAD "${2:-origin/main}" 2>/dev/null || git merge-base HEAD "${2:-main}" 2>/dev/null); then
+    echo "tidy: no git history here that has ${2:-a main}: what has changed is not known" >&2
+    exit 77
+  fi
+  differ=$(git diff --name-only --diff-filter=d "$base" -- $folders)
+  mapfile -t files < <(sed -nE '/\.(cpp|h)$/p' <<<"$differ")
+  [ ${#files[@]} -gt 0 ] || { echo "tidy: nothing has changed since $(git describe --always "$base")"; exit 0; }
+elif [ $# -eq 0 ]; then
+  mapfile -t files < <(find $folders -name '*.cpp' | sort)
 fi
-# headers are read with the files that include them
-printf '%s\0' "$@" | xargs -0 -n 1 -P "${SOLIDCULL_JOBS:-$(nproc)}" clang-tidy -p "$root/build-tidy" --quiet
-echo "tidy: $# files, nothing found"
+
+SOLIDCULL_PACKAGES="clang-tidy libbenchmark-dev" SOLIDCULL_BUILD=$root/build-tidy SOLIDCULL_CMAKE=-DSOLIDCULL_BENCHMARKS=ON \
+  scripts/prepare.sh --configure
+# a header alone is read with the flags of a file beside it
+printf '%s\0' "${files[@]}" | xargs -0 -n 1 -P "${SOLIDCULL_JOBS:-$(nproc)}" clang-tidy -p build-tidy --quiet
+echo "tidy: ${#files[@]} files, nothing found"

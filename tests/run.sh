@@ -4,7 +4,8 @@
 # tests/sanitize.sh is the second half alone; tests/core.sh runs the core's tests without an engine.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
-"$root/scripts/prepare.sh"
+# for what is not run but read: the package, the style, the comments
+SOLIDCULL_PACKAGES="dpkg-dev file clang-format doxygen" "$root/scripts/prepare.sh"
 . "$root/scripts/mpi-env.sh"
 cd "$root/build"
 ctest --output-on-failure -j 2 "$@"

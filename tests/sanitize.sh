@@ -11,4 +11,4 @@ SOLIDCULL_BUILD=$build SOLIDCULL_CMAKE="-DCMAKE_BUILD_TYPE=None -DSOLIDCULL_SANI
 export LSAN_OPTIONS=suppressions=$root/tests/lsan.supp:print_suppressions=0 UBSAN_OPTIONS=print_stacktrace=1
 cd "$build"
 # what tests/*.py run is the launcher, and the stock engine with the library preloaded: without sanitizers
-exec ctest --output-on-failure -j 2 -E '^python\.' "$@"
+exec ctest --output-on-failure -j 2 -E '^(python|style)\.' "$@"

@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 """scripts/measure_house.py: it finds what several owners write, and finds nothing of that in this project."""
 import subprocess
 import sys

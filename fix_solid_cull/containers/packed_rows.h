@@ -118,8 +118,8 @@ class PackedRows {
                         families_.capacity() * sizeof(Family) + patterns_.capacity() * sizeof(Pattern) +
                         pools_.capacity() * sizeof(Pool);
     for (const Family& f : families_) {
-      bytes += f.patterns.capacity() * sizeof(f.patterns[0]) + f.recent.capacity() * sizeof(f.recent[0]);
-      for (const auto& row : f.recent) bytes += row.capacity() * sizeof(row[0]);
+      bytes += f.patterns.capacity() * sizeof(f.patterns[0]) + f.recent.capacity() * sizeof(Row);
+      for (const Row& row : f.recent) bytes += row.capacity() * sizeof(row[0]);
     }
     for (const Pattern& p : patterns_)
       bytes += p.words.capacity() * sizeof(p.words[0]) + p.repeats.capacity() * sizeof(p.repeats[0]);
@@ -162,10 +162,11 @@ class PackedRows {
     std::uint32_t latest = 0;  // of its shapes
     int usual = 0;             // how many words of a row differ when it suits
   };
+  using Row = std::vector<std::uint64_t>;
   /// Rows of one length.
   struct Family {
-    std::vector<int> patterns;                       // most recent first
-    std::vector<std::vector<std::uint64_t>> recent;  // rows, in no order
+    std::vector<int> patterns;  // most recent first
+    std::vector<Row> recent;    // in no order
     unsigned rows = 0;
   };
   struct Pool {

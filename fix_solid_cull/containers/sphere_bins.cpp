@@ -25,7 +25,7 @@ void SphereBins::build(int n, const double* const* centres, const double* radii,
   start_.assign(static_cast<std::size_t>(bins) + 2, 0);
   for (int i = 0; i < n; ++i) ++start_[static_cast<std::size_t>(bin[i] - lowest_) + 2];
   for (std::size_t b = 2; b < start_.size(); ++b) start_[b] += start_[b - 1];
-  places_.reset(new Place[static_cast<std::size_t>(n)]);
+  places_.reset(new Place[static_cast<std::size_t>(n)]);  // NOLINT(modernize-make-unique): that would fill them first
   for (int i = 0; i < n; ++i)
     places_[static_cast<std::size_t>(start_[static_cast<std::size_t>(bin[i] - lowest_) + 1]++)] = {centres[i][0], centres[i][1],
                                                                                                    centres[i][2], radii[i], i};
@@ -35,7 +35,8 @@ const std::vector<SphereBins::Near>& SphereBins::above(int i, const double* at, 
   const double x = at[0], y = at[1], z = at[2];
   std::size_t n = 0;
   for (const Run& run : runs_) {
-    const int* const first = &start_[static_cast<std::size_t>(bin - lowest_ + run.offset)];
+    const int other = bin - lowest_ + run.offset;
+    const int* const first = &start_[static_cast<std::size_t>(other)];
     const Place *p = places_.get() + first[0], *const last = places_.get() + first[run.length];
     if (near_.size() < n + static_cast<std::size_t>(last - p)) near_.resize(2 * (n + static_cast<std::size_t>(last - p)));
     Near* const near = near_.data();

@@ -25,8 +25,8 @@ class Scales {
     look_every_ = settings_.every ? settings_.every : look_interval(diameter_, gravity_, dt);
     solid_state_ = {settings_.speed * std::sqrt(gravity_ * diameter_),
                     SolidStateLaw::out_of_balance_share * std::max(settings_.tolerance_absolute, 1.0), gravity_};
-    wake_up_ = {settings_.tolerance_absolute, settings_.tolerance_relative, gravity_, settings_.carve_radius * diameter_,
-                settings_.carve_cap, diameter_};
+    wake_up_ = {settings_.tolerance_absolute,       settings_.tolerance_relative, gravity_,
+                settings_.carve_radius * diameter_, settings_.carve_cap,          diameter_};
   }
 
   const Settings& settings() const { return settings_; }

@@ -58,7 +58,7 @@ class ContactTail {
   /// Where the partner stands, `none` if it does not.
   std::size_t find(std::int64_t partner) const;
   /// False if it has none.
-  bool history(std::size_t at, const Vec3& normal, double* history) const;
+  bool history(std::size_t number, const Vec3& normal, double* history) const;
 
   /// Whether, and which, partners stand in the words; cheaper than to read them.
   static bool names(WordView words, std::int64_t partner);
@@ -74,7 +74,7 @@ class ContactTail {
     std::size_t begin, end;  // of its history's bits
   };
   static std::size_t count_in(WordView words);
-  static std::int32_t partner_in(WordView words, std::size_t at);
+  static std::int32_t partner_in(WordView words, std::size_t number);
 
   const HistoryBits& bits_;
   std::vector<Partner> partners_;

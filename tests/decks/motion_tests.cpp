@@ -429,7 +429,8 @@ TEST(Motion, ABodyThatLosesItsSupportFalls) {
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   if (rank == 0)
-    std::printf("it fell %.4g and %.4g of the way of a free fall, unculled %.4g\n", fallen[1] / way, fallen[2] / way, fallen[0] / way);
+    std::printf("it fell %.4g and %.4g of the way of a free fall, unculled %.4g\n", fallen[1] / way, fallen[2] / way,
+                fallen[0] / way);
 }
 
 }  // namespace
