@@ -28,14 +28,15 @@ class Grounding : public BodyFollower, public StoreFollower {
   bool lets_go() const { return !to_let_go_.empty(); }
   /// In each step: walls feel what stored granules press on them. Local.
   void press_on_walls();
+  /// What walls do to an interface granule that nothing else touches: what meshes that report their load do to it, and the rest.
+  /// Local.
+  std::vector<WallLoad> wall_loads_on(int i) const;
   void goes(int i, int& walls, std::vector<WallLoad>& loads) override;
   void merged(int gone, int kept, bool same_frame) override;
   void grounded_or_let_go(int body) override { forgotten(body); }
   void forgotten(int body) override;
 
  private:
-  /// What walls do to an interface granule that nothing else touches: what meshes that report their load do to it, and the rest.
-  std::vector<WallLoad> wall_loads_on(int i) const;
   struct Sum {
     Vec3 value = Vec3::Zero();
   };

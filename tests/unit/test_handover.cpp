@@ -233,7 +233,7 @@ struct File {
   File(const File&) = delete;
 
   void write(SmallWorld& w, WorldParts& parts) {
-    const std::vector<double> numbers = parts.snapshot.write();
+    const std::vector<double> numbers = parts.snapshot.write(false);
     EXPECT_EQ(numbers.empty(), w.ranks.me != 0);
     parts.snapshot.append_to(end);
     const std::lock_guard<std::mutex> lock(mutex);
@@ -465,7 +465,7 @@ TEST(Snapshot, a_section_that_is_cut_damaged_or_of_another_file_is_refused_by_al
 TEST(Snapshot, a_file_that_cannot_be_written_is_named) {
   run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
     Block block(w, -0.03);
-    block.parts.snapshot.write();
+    block.parts.snapshot.write(false);
     EXPECT_THROW(block.parts.snapshot.append_to("/nowhere/at/all"), InputError);
   });
 }
