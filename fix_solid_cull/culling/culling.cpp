@@ -126,6 +126,7 @@ void Culling::initial_step() {
   const bool first = phase_ == Phase::ready;
   phase_ = Phase::stepping;
   if (!first || !p_.solid.has_store()) return;
+  p_.meter.begin_run(p_.report.seconds());
   take_loads();
   p_.gravity.begin_run();
   see_walls(true);
@@ -182,6 +183,7 @@ void Culling::settle_bodies() {
 void Culling::leave_out_inner_pairs() {
   if (!inner_pairs_listed_) return;
   inner_pairs_listed_ = false;
+  p_.meter.lists_are_new();
   if (!p_.census.something_locked()) return;
   const auto timed = p_.report.time(Part::load);
   std::vector<int> body(static_cast<std::size_t>(p_.ports.atoms.owned + p_.ports.atoms.ghosts));
@@ -211,6 +213,7 @@ void Culling::take_forces() {
     if (!p_.solid.has_store()) return;
     p_.pacing.begin_within_run(step);
   }
+  p_.meter.count_step(p_.report.seconds());
   if (p_.census.something_locked() || !loads_are_none_) take_loads();
   loads_are_none_ = !p_.census.something_locked();
   store_what_feels_walls();
@@ -267,7 +270,7 @@ void Culling::write_outputs() {
 
 void Culling::end_run() {
   p_.walls.remember_walls();
-  if (p_.solid.has_store()) p_.report.tell_run();
+  if (p_.solid.has_store()) p_.run_end.tell();
   if (phase_ == Phase::stepping) phase_ = Phase::between_runs;  // after `run 0` the first step is still to come, if `pre no`
 }
 

@@ -71,6 +71,7 @@ Proposal Culling::survey(bool may_cull, bool any_culled) {
     p_.cover.wake_exposed();
   }
   if (p_.ports.ranks.any(!proposal.chosen.empty())) p_.survey.tie(proposal);
+  p_.meter.see_awake(p_.survey.count_awake(patience, proposal));
   return proposal;
 }
 

@@ -31,7 +31,9 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       shown(ports, scales, solid, shell, index, groups, wake),
       meshes(ports, scales, solid, shell, index, masses, shown),
       claims(ports, scales, solid, shell, wake),
-      report(ports, solid, shell, groups, motion),
+      meter(ports, solid),
+      report(ports, solid, shell, groups, motion, meter),
+      run_end(ports, scales, meter, report),
       files(ports, scales, solid, shell, groups, meshes, report),
       invariants(ports, scales, solid, shell, groups, stored, census),
       followers{&shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown} {

@@ -24,6 +24,7 @@
 #include "ports.h"
 #include "refill.h"
 #include "report.h"
+#include "run_end.h"
 #include "scales.h"
 #include "shell.h"
 #include "shell_closure.h"
@@ -35,6 +36,7 @@
 #include "survey.h"
 #include "wake_requests.h"
 #include "wall_survey.h"
+#include "work_meter.h"
 
 namespace solidcull {
 
@@ -84,7 +86,9 @@ struct CullingParts {
   BodyMeshes meshes;
   DeckClaims claims;
 
+  WorkMeter meter;
   Report report;
+  RunEnd run_end;
   OutputFiles files;
   Invariants invariants;
   std::vector<FollowsAtoms*> followers;  // what keeps something for each atom

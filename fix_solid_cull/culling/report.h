@@ -1,4 +1,4 @@
-// What the run is told: f_ID, f_ID[...], and two lines at the end of each run.
+// What the run is told: f_ID, f_ID[...]; and all counters at its end, where the user asks for them.
 #pragma once
 
 #include <array>
@@ -11,6 +11,7 @@
 #include "shell.h"
 #include "solid.h"
 #include "stop_watch.h"
+#include "work_meter.h"
 
 namespace solidcull {
 
@@ -20,19 +21,22 @@ class Report {
   static constexpr int carried = 10;  ///< after them: what interior granules carry
   static constexpr int of_all = 6;    ///< and what all granules have together
   static constexpr int again = 2;     ///< how many were culled again, and how many of them had moved
-  static constexpr int size = counts + carried + of_all + again;
-  static constexpr int interior = 2;  ///< index of f_ID itself among them
+  static constexpr int spent = 3;     ///< granule-steps: exterior, interface, interior
+  static constexpr int size = counts + carried + of_all + again + spent + 1;  ///< the last: how many times less work
+  static constexpr int interior = 2;                                          ///< index of f_ID itself among them
 
-  Report(const Ports& ports, const Solid& solid, const Shell& shell, const BodyGroups& groups, const BodyMotion& motion)
-      : ports_(ports), solid_(solid), shell_(shell), groups_(groups), motion_(motion) {}
+  Report(const Ports& ports, const Solid& solid, const Shell& shell, const BodyGroups& groups, const BodyMotion& motion,
+         const WorkMeter& meter)
+      : ports_(ports), solid_(solid), shell_(shell), groups_(groups), motion_(motion), meter_(meter) {}
 
   /// f_ID[n + 1]. Collective.
   double value(int n);
   /// Numbers of granules are others. Local.
   void membership_changed() { ++membership_version_; }
-  /// At the end of a run. Collective.
-  void tell_run();
+  /// Two lines: how many granules and bodies there are now and what has happened so far, and seconds by part. Collective.
+  void tell_counters();
 
+  double seconds() const { return watch_.total(); }  ///< in the fix since it was made. Local
   StopWatch::Running time(Part part) { return watch_.time(part); }
 
  private:
@@ -45,8 +49,10 @@ class Report {
   const Shell& shell_;
   const BodyGroups& groups_;
   const BodyMotion& motion_;
+  const WorkMeter& meter_;
   StopWatch watch_;
   std::array<double, again> rests_again_{};
+  std::array<double, spent> spent_{};
   std::vector<double> totals_, carried_, all_;  // as of:
   std::int64_t totals_step_ = -1, totals_version_ = -1;
   std::int64_t membership_version_ = 0;

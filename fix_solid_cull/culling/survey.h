@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "awake.h"
 #include "body_groups.h"
 #include "body_motion.h"
 #include "cover.h"
@@ -81,8 +82,7 @@ class Survey {
     begin_anew(i);
     if (!rows_[i].woken) return Rested::first_time;
     rows_[i].woken = false;
-    const Vec3 way = solid_.nearest_image(ports_.atoms.place(i), rows_[i].woke_at) - rows_[i].woke_at;
-    return way.norm() > moved_share * scales_.diameter() ? Rested::moved : Rested::unmoved;
+    return way_since_woken(i) > moved_share * scales_.diameter() ? Rested::moved : Rested::unmoved;
   }
 
   // --- a look, in this order
@@ -100,6 +100,9 @@ class Survey {
   void choose_deep(const Patience& patience, Cover& cover, Proposal& proposal);
   /// What ties the chosen to their neighbours; who would make no solid is left out. Local.
   void tie(Proposal& proposal);
+
+  /// What keeps this rank's exterior granules awake, at the end of a look. Local.
+  AwakeSteps count_awake(const Patience& patience, const Proposal& proposal) const;
 
   /// Kinetic energy of what is exterior (J). Collective.
   double kinetic_energy_of_exterior() const;
@@ -119,7 +122,10 @@ class Survey {
   }
   std::vector<Vec3> accelerations() const;
   Seen see_contacts(const SolidStateLaw& law) const;
-  bool is_solid(int i, const Seen& seen, const SolidStateLaw& law);
+  Vec3 frame_of(int i, const Seen& seen) const;
+  Awake see(int i, const Seen& seen, const SolidStateLaw& law);
+  double way_since_woken(int i) const;
+  void begin_count();
   void join_bodies(const Seen& seen, int looks, Proposal& proposal);
   std::vector<char> find_steady(const std::vector<char>& asked);
   int looks_for(int i, const Patience& patience) const;
@@ -134,6 +140,8 @@ class Survey {
   const BodyGroups& groups_;
   const WallSurvey& walls_;
   PerGranule<AtRest> rows_;
+  std::vector<Awake> why_;  // of owned granules, as this look sees them
+  AwakeSteps awake_;        // what find_calm() has counted
 };
 
 }  // namespace solidcull

@@ -252,9 +252,9 @@ def thermo_rows(screen):
 
 
 def said(screen):
-    """Lines of the fix itself, but for that with seconds."""
+    """Lines of the fix itself, but for those at a run's end: the rows have their counts, and seconds are no result."""
     lines = [line.strip() for line in screen.splitlines() if re.match(r"fix \S+ solid/cull: ", line)]
-    return [line for line in lines if " s in the fix since" not in line]
+    return [line for line in lines if not re.search(r": \d+ steps, \d+ granules$| s in the fix since|granules in \d+ bodies; culled ", line)]
 
 
 def hash_of_file(file):
