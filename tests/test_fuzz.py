@@ -230,7 +230,7 @@ class Shrink(unittest.TestCase):
             return "line 3\n" in text and "line 17\n" in text and "calm 1" in text and "run" in text and d.ranks[0] > 1
 
         smallest = shrink(deck, fails)
-        self.assertEqual(smallest.text(0, True), "head\nline 3\nline 17\nfix cull all solid/cull calm 1\nrun 0\n")
+        self.assertEqual(smallest.text(0, True), "head\nline 3\nline 17\nfix cull all solid/cull report full calm 1\nrun 0\n")
         self.assertEqual(smallest.ranks, [2])
 
 

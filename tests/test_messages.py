@@ -268,11 +268,12 @@ class KeywordRefusals(Case):
         "walls open": ("walls", "open", "'closed' or 'surface'"), "walls": ("walls", None, "'closed' or 'surface'"),
         "store some": ("store", "some", STORE), "store": ("store", None, STORE),
         "restore new": ("restore", "new", "'exact' or 'refill'"), "restore": ("restore", None, "'exact' or 'refill'"),
+        "report all": ("report", "all", "'short' or 'full'"), "report": ("report", None, "'short' or 'full'"),
         "voxel fine": ("voxel", "fine", VOXEL), "voxel 0.05": ("voxel", "0.05", VOXEL), "voxel": ("voxel", None, VOXEL),
         "mesh x a.stl": ("mesh", "x", FILE), "mesh 10 a.obj": ("mesh", "a.obj", MESH), "mesh 10": ("mesh", None, MESH),
         "bed 0 a.vtp": ("bed", "0", FILE), "bed 10 a.stl": ("bed", "a.stl", BED), "bed": ("bed", None, FILE),
     }
-    KEYWORDS = "bed, calm, carve, depth, every, exterior, mesh, motion, restore, speed, store, tolerance, voxel, walls"
+    KEYWORDS = "bed, calm, carve, depth, every, exterior, mesh, motion, report, restore, speed, store, tolerance, voxel, walls"
 
     def test_wrong_type_range_and_missing_values(self):
         for words, (keyword, value, wanted) in self.WRONG.items():
@@ -699,12 +700,48 @@ class NoHarm(Case):
                                   timeout=TIME_LIMIT, check=False)
             self.assertEqual((done.returncode, done.stdout), (0, f"solidcull {VERSION}\n"))
 
-    def test_each_run_ends_with_its_sums(self):
-        run = self.accepted(BLOCK + CULL_BLOCK + "\nrun 200\nrun 200\n")
-        sums = re.findall(r"^fix cull solid/cull: \d+ exterior, \d+ interface, \d+ interior granules in \d+ bodies; culled \d+, "
-                          r"restored \d+, carves \d+; mass error \S+ kg, energy added \S+ J; \d+ culled again, \d+ had moved$", run.log, re.M)
-        self.assertEqual(len(sums), 2)
-        self.assertEqual(len(re.findall(r"^fix cull solid/cull: \S+ s in the fix since it was made: load ", run.log, re.M)), 2)
+    BLOCK_OF_A_RUN = re.compile(r"^fix cull solid/cull: (\d+) steps, (\d+) granules((?:\n  [a-z -]+ = .*)+)$", re.M)
+    COUNTERS = re.compile(r"^fix cull solid/cull: (\d+) exterior, \d+ interface, \d+ interior granules in \d+ bodies; culled \d+, restored \d+, "
+                          r"carves \d+; mass error \S+ kg, energy added \S+ J; \d+ culled again, \d+ had moved$", re.M)
+    SECONDS = re.compile(r"^fix cull solid/cull: \S+ s in the fix since it was made: load ", re.M)
+
+    def test_each_run_ends_with_a_short_block(self):
+        run = self.accepted(BLOCK + CULL_BLOCK + "\nthermo_style custom step f_cull[31] f_cull[32] f_cull[33] f_cull[34]\n"
+                            "run 200\nrun 300\nrun 0\n")
+        for text in (run.log, run.screen):
+            blocks = [(int(steps), int(granules), dict(re.findall(r"^  (\S.*?) += (.*)$", lines, re.M)))
+                      for steps, granules, lines in self.BLOCK_OF_A_RUN.findall(text)]
+            self.assertEqual([b[:2] for b in blocks], [(200, 343), (300, 343)], "none after a run of no step")
+            self.assertEqual((self.COUNTERS.findall(text), self.SECONDS.findall(text)), ([], []))
+        rows = [[float(x) for x in row.split()] for row in run.thermo()]
+        ends = [next(r for r in reversed(rows) if r[0] == step) for step in (0, 200, 500)]
+        for before, after, (steps, granules, told) in zip(ends, ends[1:], blocks):
+            exterior, interface, interior, times = (b - a for a, b in zip(before[1:], after[1:]))
+            self.assertEqual(exterior + interface + interior, steps * granules)
+            for name, counted in (("exterior", exterior), ("interface", interface), ("left out", interior)):
+                mean, share = re.match(r"(\d+) \((\S+) %\)", told[name]).groups()
+                self.assertAlmostEqual(float(mean), counted / steps, delta=0.51)
+                self.assertAlmostEqual(float(share), 100 * counted / steps / granules, delta=0.051)
+            computed, saved = map(float, re.match(r"(\S+) computed, (\S+) saved", told["granule-steps"]).groups())
+            self.assertAlmostEqual(computed / (exterior + interface), 1, delta=0.006)
+            self.assertAlmostEqual(saved / interior, 1, delta=0.006)
+            self.assertRegex(told["time"], r"^\S+ s, of it \S+ s in the fix$", "too few granules to say how much less work it was")
+            self.assertEqual(times, 0)
+
+    def test_a_run_on_two_ranks_counts_all_granules(self):
+        run = self.accepted(BLOCK + CULL_BLOCK + "\nthermo_style custom step f_cull[31] f_cull[32] f_cull[33]\nrun 200\n", ranks=2)
+        told = self.BLOCK_OF_A_RUN.search(run.log)
+        self.assertEqual(told.groups()[:2], ("200", "343"))
+        counted = [float(x) for x in run.thermo()[-1].split()[1:]]
+        self.assertEqual(sum(counted), 200 * 343)
+        self.assertGreater(counted[2], 0)
+        self.assertIn(f"  left out      = {counted[2] / 200:.0f} (", told[3])
+
+    def test_all_counters_follow_where_they_are_asked_for(self):
+        run = self.accepted(BLOCK + CULL_BLOCK + " report full\nrun 200\nrun 0\n")
+        self.assertEqual(len(self.BLOCK_OF_A_RUN.findall(run.log)), 1)
+        self.assertEqual(len(self.COUNTERS.findall(run.log)), 2)
+        self.assertEqual(len(self.SECONDS.findall(run.log)), 2)
 
 
 class CommandPages(unittest.TestCase):

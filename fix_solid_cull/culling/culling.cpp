@@ -123,6 +123,7 @@ void Culling::initial_step() {
   const bool first = phase_ == Phase::ready;
   phase_ = Phase::stepping;
   if (!first || !bed_.solid.has_store()) return;
+  p_.meter.begin_run(p_.report.seconds());
   take_loads();
   p_.gravity.begin_run();
   look_.see_walls(true);
@@ -183,6 +184,7 @@ void Culling::take_forces() {
     if (!bed_.solid.has_store()) return;
     p_.pacing.begin_within_run(step);
   }
+  p_.meter.count_step(p_.report.seconds());
   if (bed_.census.something_locked() || !loads_are_none_) take_loads();
   loads_are_none_ = !bed_.census.something_locked();
   store_what_feels_walls();
@@ -238,7 +240,7 @@ void Culling::write_outputs() {
 
 void Culling::end_run() {
   p_.walls.remember_walls();
-  if (bed_.solid.has_store()) p_.report.tell_run();
+  if (bed_.solid.has_store()) p_.run_end.tell();
   if (phase_ == Phase::stepping) phase_ = Phase::between_runs;  // after `run 0` the first step is still to come, if `pre no`
 }
 

@@ -35,6 +35,7 @@ class Culling {
   void note_new_lists() { p_.freezing.note_new_lists(); }  ///< local
   void leave_out_inner_pairs() {                           ///< local
     if (!p_.freezing.inner_pairs_listed()) return;
+    p_.meter.note_new_lists();
     const auto timed = p_.report.time(Part::load);
     p_.freezing.leave_out_inner_pairs();
   }

@@ -23,7 +23,9 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       shown(bed, wake),
       meshes(bed, shown),
       claims(bed, wake),
-      report(bed, motion),
+      meter(bed),
+      report(bed, motion, meter),
+      run_end(bed, meter, report),
       files(bed, meshes, report),
       invariants(bed),
       followers{&bed.shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown} {

@@ -20,6 +20,7 @@
 #include "parcels.h"
 #include "refill.h"
 #include "report.h"
+#include "run_end.h"
 #include "shell_closure.h"
 #include "shown_bed.h"
 #include "snapshot.h"
@@ -27,6 +28,7 @@
 #include "survey.h"
 #include "wake_requests.h"
 #include "wall_survey.h"
+#include "work_meter.h"
 
 namespace solidcull {
 
@@ -66,7 +68,9 @@ struct CullingParts {
   BodyMeshes meshes;
   DeckClaims claims;
 
+  WorkMeter meter;
   Report report;
+  RunEnd run_end;
   OutputFiles files;
   Invariants invariants;
   std::vector<FollowsAtoms*> followers;  // what keeps something for each atom

@@ -72,6 +72,7 @@ Proposal Look::survey(bool may_cull, bool any_culled) {
     p_.cover.wake_exposed();
   }
   if (bed_.ranks.any(!proposal.chosen.empty())) p_.survey.tie(proposal);
+  p_.meter.see_awake(p_.survey.count_awake(patience, proposal));
   return proposal;
 }
 

@@ -318,6 +318,7 @@ class Run {
   /// Neighbour lists are to be built at this step, so that membership can change. True if that was not asked for already. All
   /// ranks ask alike.
   virtual bool ask_for_reneighbouring(std::int64_t step) = 0;
+  virtual double seconds_of_pair_forces() const = 0;    ///< in this run, on this rank. Local
   virtual void say(const std::string& line) const = 0;  ///< one line to screen and log, by rank 0, under the fix's name
 };
 

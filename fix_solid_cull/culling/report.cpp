@@ -16,6 +16,8 @@ double Report::value(int n) {
   totals_version_ = membership_version_;
   if (totals_.empty()) count_totals();
   if (n < counts) return totals_[n];
+  if (n == size - 1) return meter_.times_less();  // known when a run has ended: its last step has been counted before
+  if (n >= counts + carried + of_all + again) return spent_[n - counts - carried - of_all - again];
   if (n >= counts + carried + of_all) return rests_again_[n - counts - carried - of_all];
   if (n < counts + carried) {
     if (carried_.empty()) sum_carried();
@@ -32,7 +34,8 @@ void Report::count_totals() {
     for (int i = 0; i < bed_.atoms.owned; ++i) interface_granules += bed_.shell[i].locked;
   const Ledger& ledger = bed_.solid.ledger();
   const bool open = bed_.solid.has_store();
-  double sums[11] = {bed_.atoms.owned - interface_granules,
+  const RunWork so_far = meter_.so_far();
+  double sums[14] = {bed_.atoms.owned - interface_granules,
                      interface_granules,
                      open ? static_cast<double>(bed_.solid.store().size()) : 0.0,
                      bodies,
@@ -42,13 +45,17 @@ void Report::count_totals() {
                      open ? ledger.mass_error(bed_.solid.store()) : 0.0,
                      ledger.energy_added(),
                      static_cast<double>(ledger.granules_locked_again()),
-                     static_cast<double>(ledger.granules_that_moved())};
-  bed_.ranks.sum(sums, 11);
+                     static_cast<double>(ledger.granules_that_moved()),
+                     so_far.exterior,
+                     so_far.interface,
+                     so_far.interior};
+  bed_.ranks.sum(sums, 14);
   double largest[2] = {motion_.largest_excess(), watch_.total()};
   bed_.ranks.largest(largest, 2);
   totals_ = {sums[0],    sums[1],    sums[2], sums[3], sums[4], sums[5], sums[6], static_cast<double>(ledger.carves()),
              largest[0], largest[1], sums[7], sums[8]};
   rests_again_ = {sums[9], sums[10]};
+  spent_ = {sums[11], sums[12], sums[13]};
 }
 
 /// What interior granules carry, so that a deck can add it to what its atoms have: momentum, angular momentum about the origin,
@@ -99,7 +106,7 @@ void Report::sum_all() {
   all_.assign(sums, sums + 6);
 }
 
-void Report::tell_run() {
+void Report::tell_counters() {
   static const char* names[] = {"load", "look", "depth", "membership", "shell", "mesh", "files"};
   constexpr int parts = static_cast<int>(Part::count);
   double seconds[parts];

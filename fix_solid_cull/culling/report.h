@@ -1,4 +1,4 @@
-// What the run is told: f_ID, f_ID[...], and two lines at the end of each run.
+// What the run is told: f_ID, f_ID[...]; and all counters at its end, where the user asks for them.
 #pragma once
 
 #include <array>
@@ -8,6 +8,7 @@
 #include "bed.h"
 #include "body_motion.h"
 #include "stop_watch.h"
+#include "work_meter.h"
 
 namespace solidcull {
 
@@ -17,18 +18,20 @@ class Report {
   static constexpr int carried = 10;  ///< after them: what interior granules carry
   static constexpr int of_all = 6;    ///< and what all granules have together
   static constexpr int again = 2;     ///< how many were culled again, and how many of them had moved
-  static constexpr int size = counts + carried + of_all + again;
-  static constexpr int interior = 2;  ///< index of f_ID itself among them
+  static constexpr int spent = 3;     ///< granule-steps: exterior, interface, interior
+  static constexpr int size = counts + carried + of_all + again + spent + 1;  ///< the last: how many times less work
+  static constexpr int interior = 2;                                          ///< index of f_ID itself among them
 
-  Report(const Bed& bed, const BodyMotion& motion) : bed_(bed), motion_(motion) {}
+  Report(const Bed& bed, const BodyMotion& motion, const WorkMeter& meter) : bed_(bed), motion_(motion), meter_(meter) {}
 
   /// f_ID[n + 1]. Collective.
   double value(int n);
   /// Numbers of granules are others. Local.
   void membership_changed() { ++membership_version_; }
-  /// At the end of a run. Collective.
-  void tell_run();
+  /// Two lines: how many granules and bodies there are now and what has happened so far, and seconds by part. Collective.
+  void tell_counters();
 
+  double seconds() const { return watch_.total(); }  ///< in the fix since it was made. Local
   StopWatch::Running time(Part part) { return watch_.time(part); }
 
  private:
@@ -38,8 +41,10 @@ class Report {
 
   const Bed& bed_;
   const BodyMotion& motion_;
+  const WorkMeter& meter_;
   StopWatch watch_;
   std::array<double, again> rests_again_{};
+  std::array<double, spent> spent_{};
   std::vector<double> totals_, carried_, all_;  // as of:
   std::int64_t totals_step_ = -1, totals_version_ = -1;
   std::int64_t membership_version_ = 0;

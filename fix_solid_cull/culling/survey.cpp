@@ -40,8 +40,34 @@ double Survey::kinetic_energy_of_exterior() const {
 }
 
 void Survey::forget_calm() {
+  begin_count();
   for (int i = 0; i < bed_.atoms.owned; ++i)
     if (!bed_.shell[i].locked) rows_[i].calm = 0;
+}
+
+// ------------------------------------------------------------------------------------------------------------ what is awake
+
+void Survey::begin_count() {
+  awake_ = {};
+  why_.assign(static_cast<std::size_t>(bed_.atoms.owned), Awake::paused);
+}
+
+AwakeSteps Survey::count_awake(const Patience& patience, const Proposal& proposal) const {
+  const FlatMap<char> chosen = set_of(proposal.chosen);
+  const bool covers = bed_.scales.depth() > 0;
+  AwakeSteps awake = awake_;
+  for (int i = 0; i < bed_.atoms.owned; ++i) {
+    if (bed_.shell[i].locked) continue;
+    const bool covered = covers && why_[i] == Awake::settling && calm_enough(i, patience) && !chosen.contains(bed_.atoms.tag[i]);
+    awake[covered ? Awake::covered : why_[i]] += 1;
+    awake.in_vain += rows_[i].woken && way_since_woken(i) <= moved_share * bed_.scales.diameter();
+  }
+  return awake;
+}
+
+/// m
+double Survey::way_since_woken(int i) const {
+  return (bed_.solid.nearest_image(bed_.atoms.place(i), rows_[i].woke_at) - rows_[i].woke_at).norm();
 }
 
 // ------------------------------------------------------------------------------------------------------------ solid state
@@ -74,11 +100,14 @@ std::vector<Vec3> Survey::accelerations() const {
   return a;
 }
 
+// how it moves against what it touches: by less than twice `speed`, or faster
+constexpr char nearly_quiet = 1, fast = 2;
+
 /// What the neighbour lists say of each owned granule.
 struct Survey::Seen {
   std::vector<Vec3> acceleration;  // of owned granules and ghosts (m/s^2)
   std::vector<char> touching;      // it has a neighbour within the gap
-  std::vector<char> moving;        // it moves against one of them
+  std::vector<char> moving;        // it moves against one of them: nearly_quiet or fast
   std::vector<char> loaded;        // one of them presses on it
   std::vector<char> drifting;      // it drifts away from one that does not
   std::vector<Vec3> around;        // sum of mass times acceleration of what it touches (N)
@@ -99,6 +128,8 @@ Survey::Seen Survey::see_contacts(const SolidStateLaw& law) const {
   const int owned = atoms.owned;
   Seen seen(static_cast<std::size_t>(owned));
   seen.acceleration = accelerations();
+  SolidStateLaw twice = law;
+  twice.speed *= 2;
   const double bears = bed_.contacts.reach_factor;
   const NeighbourRows list = bed_.contacts.neighbours();
   for (int row = 0; row < list.rows; ++row) {
@@ -116,13 +147,14 @@ Survey::Seen Survey::see_contacts(const SolidStateLaw& law) const {
       if (!pressed && square > bears * bears * radii * radii && law.spins_beside(a, b)) continue;
       const bool drifts = !pressed && !law.still_neighbour(a, b);
       const bool quiet = law.quiet_contact(a, b);
+      const bool nearly = !quiet && twice.quiet_contact(a, b);
       const auto note = [&](int one, int other) {
         seen.loaded[one] |= pressed;
         seen.drifting[one] |= drifts;
         seen.touching[one] = 1;
         seen.around[one] += atoms.mass[other] * seen.acceleration[other];
         seen.mass[one] += atoms.mass[other];
-        if (!quiet) seen.moving[one] = 1;
+        if (!quiet) seen.moving[one] = std::max(seen.moving[one], nearly ? nearly_quiet : fast);
       };
       note(i, j);
       if (j < owned) note(j, i);
@@ -132,22 +164,28 @@ Survey::Seen Survey::see_contacts(const SolidStateLaw& law) const {
   return seen;
 }
 
-bool Survey::is_solid(int i, const Seen& seen, const SolidStateLaw& law) {
+/// Acceleration of what it touches (m/s^2): a wall is a neighbour too; that it is accelerated itself is not known here.
+Vec3 Survey::frame_of(int i, const Seen& seen) const {
+  return seen.around[i] / (seen.mass[i] + (walls_[i].touched > 0 ? bed_.atoms.mass[i] : 0.0));
+}
+
+/// What keeps it awake now; `settling` if nothing does.
+Awake Survey::see(int i, const Seen& seen, const SolidStateLaw& law) {
   const Atoms& atoms = bed_.atoms;
   const AtWall& wall = walls_[i];
   const bool at_wall = wall.touched > 0, loaded = seen.loaded[i] || at_wall;
   const Vec3 v = atoms.velocity(i);
   // a granule that touches nothing but a wall that stands still is one with it where it stays: not where it rolls or slides
   const bool leaves_wall = !seen.touching[i] && wall.stands && std::max(v.norm(), wall.slip) >= law.speed;
-  if (!(seen.touching[i] || at_wall) || seen.moving[i] || leaves_wall || !(loaded || !seen.drifting[i]) ||
-      !atoms.may_be_culled(i))
-    return false;
-  if (!bed_.scales.rigid())
-    return law.at_rest(v, atoms.spin(i), atoms.radius[i]) && law.balanced(seen.acceleration[i], Vec3::Zero());
-  // a wall is a neighbour too; that it is accelerated itself is not known here
-  const double all = seen.mass[i] + (at_wall ? atoms.mass[i] : 0.0);
-  const Vec3 frame = seen.around[i] / all;
-  if (!law.balanced(seen.acceleration[i], frame)) return false;
+  if (!atoms.may_be_culled(i)) return Awake::held;
+  if (!(seen.touching[i] || at_wall) || !(loaded || !seen.drifting[i])) return Awake::alone;
+  if (seen.moving[i] || leaves_wall) return Awake::moving;
+  if (!bed_.scales.rigid()) {
+    if (!law.at_rest(v, atoms.spin(i), atoms.radius[i])) return Awake::moving;
+    return law.balanced(seen.acceleration[i], Vec3::Zero()) ? Awake::settling : Awake::unsteady;
+  }
+  const Vec3 frame = frame_of(i, seen);
+  if (!law.balanced(seen.acceleration[i], frame)) return Awake::unsteady;
   AtRest& r = rows_[i];
   const double passed = static_cast<double>(bed_.run.step - r.since) * bed_.run.dt;
   if (r.calm == 0 || !law.went_on(v - r.velocity, r.acceleration_around, frame, passed)) {
@@ -156,7 +194,7 @@ bool Survey::is_solid(int i, const Seen& seen, const SolidStateLaw& law) {
     r.acceleration_around = frame;
     r.since = bed_.run.step;
   }
-  return true;
+  return Awake::settling;
 }
 
 std::int64_t Survey::find_calm(const Patience& patience, Proposal& proposal) {
@@ -164,11 +202,18 @@ std::int64_t Survey::find_calm(const Patience& patience, Proposal& proposal) {
   law.speed /= patience.speed_divisor;
   law.force /= patience.force_divisor;
   const Seen seen = see_contacts(law);
+  SolidStateLaw twice = law;
+  twice.force *= 2;
   std::int64_t candidates = 0;
+  begin_count();
   for (int i = 0; i < bed_.atoms.owned; ++i) {
     if (bed_.shell[i].locked) continue;
-    const bool solid = is_solid(i, seen, law);
+    why_[i] = see(i, seen, law);
+    const bool solid = why_[i] == Awake::settling;
     rows_[i].calm = solid ? rows_[i].calm + 1 : 0;
+    if (why_[i] == Awake::moving && seen.moving[i] == nearly_quiet)
+      awake_.nearly_slow += law.balanced(seen.acceleration[i], frame_of(i, seen));
+    if (why_[i] == Awake::unsteady) awake_.nearly_balanced += twice.balanced(seen.acceleration[i], frame_of(i, seen));
     candidates += rows_[i].calm >= looks_for(i, patience);
   }
   join_bodies(seen, patience.looks, proposal);
@@ -275,8 +320,7 @@ void Survey::choose_deep(const Patience& patience, Cover& cover, Proposal& propo
 /// A granule that woke and still stands where it stood has shown before that it bears its load there: half of the looks.
 int Survey::looks_for(int i, const Patience& patience) const {
   if (patience.quick || !rows_[i].woken) return patience.looks;
-  const Vec3 way = bed_.solid.nearest_image(bed_.atoms.place(i), rows_[i].woke_at) - rows_[i].woke_at;
-  return way.norm() > stands_share * bed_.scales.diameter() ? patience.looks : (patience.looks + 1) / 2;
+  return way_since_woken(i) > stands_share * bed_.scales.diameter() ? patience.looks : (patience.looks + 1) / 2;
 }
 
 /// Calm for as many looks as what presses on it asks for.

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "awake.h"
 #include "bed.h"
 #include "body_motion.h"
 #include "cover.h"
@@ -80,8 +81,7 @@ class Survey {
     begin_anew(i);
     if (!rows_[i].woken) return Rested::first_time;
     rows_[i].woken = false;
-    const Vec3 way = bed_.solid.nearest_image(bed_.atoms.place(i), rows_[i].woke_at) - rows_[i].woke_at;
-    return way.norm() > moved_share * bed_.scales.diameter() ? Rested::moved : Rested::unmoved;
+    return way_since_woken(i) > moved_share * bed_.scales.diameter() ? Rested::moved : Rested::unmoved;
   }
 
   // --- a look, in this order
@@ -99,6 +99,9 @@ class Survey {
   void choose_deep(const Patience& patience, Cover& cover, Proposal& proposal);
   /// What ties the chosen to their neighbours; who would make no solid is left out. Local.
   void tie(Proposal& proposal);
+
+  /// What keeps this rank's exterior granules awake, at the end of a look. Local.
+  AwakeSteps count_awake(const Patience& patience, const Proposal& proposal) const;
 
   /// Kinetic energy of what is exterior (J). Collective.
   double kinetic_energy_of_exterior() const;
@@ -118,7 +121,10 @@ class Survey {
   }
   std::vector<Vec3> accelerations() const;
   Seen see_contacts(const SolidStateLaw& law) const;
-  bool is_solid(int i, const Seen& seen, const SolidStateLaw& law);
+  Vec3 frame_of(int i, const Seen& seen) const;
+  Awake see(int i, const Seen& seen, const SolidStateLaw& law);
+  double way_since_woken(int i) const;
+  void begin_count();
   void join_bodies(const Seen& seen, int looks, Proposal& proposal);
   std::vector<char> find_steady(const std::vector<char>& asked);
   int looks_for(int i, const Patience& patience) const;
@@ -129,6 +135,8 @@ class Survey {
   const BodyMotion& motion_;
   const WallSurvey& walls_;
   PerGranule<AtRest> rows_;
+  std::vector<Awake> why_;  // of owned granules, as this look sees them
+  AwakeSteps awake_;        // what find_calm() has counted
 };
 
 }  // namespace solidcull

@@ -109,6 +109,11 @@ const std::map<std::string, Reader>& readers() {
                   {{"exact", [&] { s.restore = Restore::exact; }}, {"refill", [&] { s.restore = Restore::refill; }}});
        }},
       {"voxel", [](Values& v, Settings& s) { s.voxel = v.number("a size in mean diameters, 0.1 to 2", 0.1, true, 2.0); }},
+      {"report",
+       [](Values& v, Settings& s) {
+         v.one_of("'short' or 'full'",
+                  {{"short", [&] { s.report = ReportLength::brief; }}, {"full", [&] { s.report = ReportLength::full; }}});
+       }},
       {"mesh",
        [](Values& v, Settings& s) {
          const int every = v.whole("a whole number of steps, 1 or more, and a file name", 1);

@@ -11,6 +11,7 @@ enum class Motion { rigid, fixed };
 enum class WallCover { closed, surface };
 enum class Store { exact, compact, none };
 enum class Restore { exact, refill };
+enum class ReportLength { brief, full };
 
 /// A file every so many steps; a '*' in its name becomes the step.
 struct Output {
@@ -33,6 +34,7 @@ struct Settings {
   Store store = Store::exact;
   Restore restore = Restore::exact;
   double voxel = 0.5;          ///< in mean diameters
+  ReportLength report = ReportLength::brief;
   std::vector<Output> meshes;  ///< interface meshes; the keyword may stand more than once
   std::vector<Output> beds;    ///< the whole bed; likewise
 };

@@ -9,6 +9,7 @@
 #include "fix_gravity.h"
 #include "modify.h"
 #include "neighbor.h"
+#include "timer.h"
 #include "update.h"
 
 namespace solidcull {
@@ -51,6 +52,8 @@ bool EngineRun::ask_for_reneighbouring(std::int64_t at) {
   own_->next_reneighbor = at + reset_by;
   return is_new;
 }
+
+double EngineRun::seconds_of_pair_forces() const { return timer->array[TIME_PAIR]; }
 
 void EngineRun::say(const std::string& line) const {
   if (comm->me != 0) return;

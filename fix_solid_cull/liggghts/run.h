@@ -20,6 +20,7 @@ class EngineRun : public Run, protected LAMMPS_NS::Pointers {
   Vec3 gravity() const override;
   Vec3 wrapped(const Vec3& place) const override;
   bool ask_for_reneighbouring(std::int64_t at) override;
+  double seconds_of_pair_forces() const override;
   void say(const std::string& line) const override;
 
  private:

@@ -20,7 +20,7 @@ class CullLine(Part):
     keywords: list = field(default_factory=list)
 
     def text(self, culled):
-        return [" ".join(["fix cull all solid/cull", *self.keywords])] if culled else []
+        return [" ".join(["fix cull all solid/cull report full", *self.keywords])] if culled else []
 
 
 @dataclass

@@ -248,9 +248,10 @@ def thermo_rows(screen):
 
 
 def said(screen):
-    """Lines of the fix itself, but for those with seconds and the version."""
+    """Lines of the fix itself, but for its version and those at a run's end: the rows have their counts, and seconds are no result."""
     lines = [line.strip() for line in screen.splitlines() if re.match(r"fix \S+ solid/cull: ", line)]
-    return [line for line in lines if " s in the fix since" not in line and "solid/cull: version " not in line]
+    no_result = r": \d+ steps, \d+ granules$| s in the fix since|granules in \d+ bodies; culled |solid/cull: version "
+    return [line for line in lines if not re.search(no_result, line)]
 
 
 def hash_of_file(file):

@@ -271,9 +271,11 @@ class SmallRun : public Run {
   Vec3 gravity() const override;
   Vec3 wrapped(const Vec3& place) const override;
   bool ask_for_reneighbouring(std::int64_t step) override;
+  double seconds_of_pair_forces() const override { return pair_forces; }
   void say(const std::string& line) const override;
 
   std::int64_t asked = -1;
+  double pair_forces = 0;  // s
   mutable std::vector<std::string> said;
 
  private:

@@ -221,9 +221,9 @@ TEST(Report, says_what_stored_granules_carry) {
   EXPECT_LT((three(19) - centre).norm(), 1e-12 * centre.norm());
 }
 
-TEST(Report, each_run_ends_with_two_lines) {
+TEST(Report, tells_all_counters_in_two_lines) {
   TwoBodies two;
-  two.parts.report.tell_run();
+  two.parts.report.tell_counters();
   ASSERT_EQ(two.world.run.said.size(), 2u);
   EXPECT_TRUE(says(two.world.run.said[0], "0 exterior, 6 interface, 2 interior granules in 2 bodies; culled 8, restored 0"));
   EXPECT_TRUE(says(two.world.run.said[1], "s in the fix since it was made"));

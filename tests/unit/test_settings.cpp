@@ -52,6 +52,7 @@ void expect_same(const Settings& a, const Settings& b) {
   EXPECT_EQ(a.store, b.store);
   EXPECT_EQ(a.restore, b.restore);
   EXPECT_EQ(a.voxel, b.voxel);
+  EXPECT_EQ(a.report, b.report);
   EXPECT_EQ(listed(a.meshes), listed(b.meshes));
   EXPECT_EQ(listed(a.beds), listed(b.beds));
 }
@@ -82,6 +83,7 @@ TEST(Settings, without_keywords_are_the_defaults) {
   EXPECT_EQ(s.store, Store::exact);
   EXPECT_EQ(s.restore, Restore::exact);
   EXPECT_EQ(s.voxel, 0.5);
+  EXPECT_EQ(s.report, ReportLength::brief);
   EXPECT_TRUE(s.meshes.empty());
   EXPECT_TRUE(s.beds.empty());
 }
@@ -100,11 +102,12 @@ TEST(Settings, every_keyword_is_parsed) {
   due.motion = Motion::fixed;
   due.walls = WallCover::surface;
   due.voxel = 0.25;
+  due.report = ReportLength::full;
   due.meshes = {{100, "out/mesh.*.vdb"}};
   due.beds = {{200, "bed.vtp"}};
   const std::string line =
       "every 40 depth 3.5 exterior live speed 1e-3 calm 5 tolerance 0.5 0.1 carve 1.5 6 motion fixed walls surface store exact "
-      "restore exact voxel 0.25 mesh 100 out/mesh.*.vdb bed 200 bed.vtp";
+      "restore exact voxel 0.25 report full mesh 100 out/mesh.*.vdb bed 200 bed.vtp";
   expect_same(parsed(line), due);
   std::set<std::string> named;
   for (const std::string& w : words(line)) named.insert(w);
@@ -154,6 +157,8 @@ TEST(Settings, the_limits_themselves_are_allowed) {
                            "walls surface",
                            "motion rigid",
                            "motion fixed",
+                           "report short",
+                           "report full",
                            "mesh 1 a.vdb",
                            "mesh 1 a.stl",
                            "mesh 1 a.vtp",
@@ -245,6 +250,9 @@ const Refusal refusals[] = {
     {"voxel fine", "keyword 'voxel' has the value 'fine': give a size in mean diameters, 0.1 to 2"},
     {"voxel", "keyword 'voxel' ends too early: give a size in mean diameters, 0.1 to 2"},
 
+    {"report long", "keyword 'report' has the value 'long': give 'short' or 'full'"},
+    {"report", "keyword 'report' ends too early: give 'short' or 'full'"},
+
     {"mesh 0 a.stl", "keyword 'mesh' has the value '0': give a whole number of steps, 1 or more, and a file name"},
     {"mesh a.stl", "keyword 'mesh' has the value 'a.stl': give a whole number of steps, 1 or more, and a file name"},
     {"mesh", "keyword 'mesh' ends too early: give a whole number of steps, 1 or more, and a file name"},
@@ -263,10 +271,10 @@ const Refusal refusals[] = {
     {"depth 0.8 exterior live", "voxel 0.5 is too coarse for depth 0.8: choose voxel <= depth/2"},
 
     {"deptth 2",
-     "unknown keyword 'deptth': choose from bed, calm, carve, depth, every, exterior, mesh, motion, restore, speed, store, "
+     "unknown keyword 'deptth': choose from bed, calm, carve, depth, every, exterior, mesh, motion, report, restore, speed, store, "
      "tolerance, voxel, walls"},
     {"calm 3 4",
-     "unknown keyword '4': choose from bed, calm, carve, depth, every, exterior, mesh, motion, restore, speed, store, "
+     "unknown keyword '4': choose from bed, calm, carve, depth, every, exterior, mesh, motion, report, restore, speed, store, "
      "tolerance, voxel, walls"},
 };
 

@@ -430,5 +430,85 @@ TEST(Survey, exterior_granules_are_counted_with_their_energy) {
   EXPECT_DOUBLE_EQ(bed.parts.survey.kinetic_energy_of_exterior(), 4.5 * bed.world.atoms.mass[i]);
 }
 
+// ------------------------------------------------------------------------------------------------------------- what is awake
+
+/// How many each reason keeps awake, as the last look saw it.
+AwakeSteps awake(const Bed& bed, int looks = looks_to_calm) {
+  return bed.parts.survey.count_awake({false, looks, 1}, bed.proposal);
+}
+
+TEST(Awake, each_exterior_granule_has_one_reason) {
+  Bed bed;
+  const Vec3 end = bed.row(1, 3, Vec3::Zero());
+  bed.row(4, 1, end + Vec3(0.1, 0, 0));
+  bed.row(5, 2, Vec3(0, 0.1, 0));
+  bed.row(7, 2, Vec3(0, 0.2, 0));
+  bed.begin();
+  bed.set_velocity(5, Vec3(0, 3 * bed.speed, 0));
+  bed.set_velocity(7, Vec3(0, 1.5 * bed.speed, 0));
+  bed.look();
+  const AwakeSteps now = awake(bed);
+  EXPECT_EQ(now[Awake::settling], 3);
+  EXPECT_EQ(now[Awake::alone], 1);
+  EXPECT_EQ(now[Awake::moving], 4);
+  EXPECT_EQ(now.all(), 8);
+  EXPECT_EQ(now.nearly_slow, 2) << "7 and 8 would be calm with twice the speed";
+  EXPECT_EQ(now.in_vain, 0);
+}
+
+TEST(Awake, what_the_deck_holds_is_held_and_what_is_not_looked_at_waits) {
+  Bed bed;
+  bed.row(1, 3, Vec3::Zero());
+  bed.begin();
+  bed.world.atoms.groups[bed.world.at(2)] = 0;
+  bed.look();
+  EXPECT_EQ(awake(bed)[Awake::held], 1);
+  EXPECT_EQ(awake(bed)[Awake::settling], 2);
+  bed.parts.survey.forget_calm();
+  EXPECT_EQ(awake(bed)[Awake::paused], 3);
+  EXPECT_EQ(awake(bed).all(), 3);
+}
+
+TEST(Awake, out_of_balance_by_less_than_twice_the_limit) {
+  Bed bed;
+  bed.row(1, 2, Vec3::Zero());
+  bed.row(3, 2, Vec3(0, 0.1, 0));
+  bed.begin();
+  const double limit = bed.parts.scales.solid_state().force * bed.weight();
+  bed.world.atoms.f[3 * bed.world.at(1)] = 1.5 * limit;
+  bed.world.atoms.f[3 * bed.world.at(3)] = 3 * limit;
+  bed.look();
+  EXPECT_EQ(awake(bed)[Awake::unsteady], 4);
+  EXPECT_EQ(awake(bed).nearly_balanced, 2);
+}
+
+TEST(Awake, in_solid_state_but_covered) {
+  Settings settings = sleeping_settings();
+  settings.depth = 1.5;
+  Bed bed(settings);
+  bed.row(1, 6, Vec3::Zero());
+  bed.begin();
+  for (int n = 0; n < looks_to_calm; ++n) {
+    bed.set_velocity(1, Vec3(0, 3 * bed.speed, 0));
+    bed.look();
+  }
+  const AwakeSteps now = awake(bed);
+  EXPECT_EQ(now[Awake::moving], 2) << "1, and 2 against it";
+  EXPECT_GE(now[Awake::covered], 1);
+  EXPECT_EQ(now[Awake::covered] + now[Awake::settling], 4);
+  EXPECT_EQ(now[Awake::settling], static_cast<double>(bed.chosen().size()));
+}
+
+TEST(Awake, woken_and_still_there_is_awake_in_vain) {
+  Bed bed;
+  bed.row(1, 3, Vec3::Zero());
+  bed.begin();
+  bed.parts.survey.wakes(bed.world.at(1));
+  bed.parts.survey.wakes(bed.world.at(2));
+  bed.parts.survey.rows()[bed.world.at(2)].woke_at += Vec3(0, 0, 0.02 * 2 * r);
+  bed.look();
+  EXPECT_EQ(awake(bed).in_vain, 1);
+}
+
 }  // namespace
 }  // namespace solidcull

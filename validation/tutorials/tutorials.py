@@ -73,7 +73,7 @@ def shortened(lines, most):
 def with_line(lines, exterior):
     """The deck with the fix line before its last run, or with none; at its end it says how many granules there are."""
     last = max(k for k, line in enumerate(lines) if words_of(line)[:1] == ["run"])
-    cull = [f"fix cull all solid/cull exterior {exterior}"] if exterior else []
+    cull = [f"fix cull all solid/cull exterior {exterior} report full"] if exterior else []
     count = ["unfix cull"] if exterior else []
     count += ["run 0", "variable tutorial_end equal atoms", 'print "TUTORIAL: ${tutorial_end} granules"',
               'write_dump all custom tutorial.end id modify format "%d"']

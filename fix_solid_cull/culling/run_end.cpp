@@ -1,0 +1,21 @@
+#include "run_end.h"
+
+#include <vector>
+
+#include "run_summary.h"
+
+namespace solidcull {
+
+void RunEnd::tell() {
+  const std::vector<RunWork> ranks = bed_.ranks.gather(std::vector<RunWork>{meter_.end_run(report_.seconds())});
+  RunSummary run;
+  run.work = sum_of(ranks);
+  run.seconds_without = seconds_without(ranks);
+  if (run.seconds_without > 0) meter_.compare(run.work.seconds, run.seconds_without);
+  run.runs = meter_.compared();
+  run.times_less = meter_.times_less();
+  if (run.work.steps > 0) bed_.run.say(text_of(run, bed_.scales.settings()));
+  if (bed_.scales.settings().report == ReportLength::full) report_.tell_counters();
+}
+
+}  // namespace solidcull

@@ -1,0 +1,23 @@
+// The end of a run: what the user is told, in a few lines.
+#pragma once
+
+#include "bed.h"
+#include "report.h"
+#include "work_meter.h"
+
+namespace solidcull {
+
+class RunEnd {
+ public:
+  RunEnd(const Bed& bed, WorkMeter& meter, Report& report) : bed_(bed), meter_(meter), report_(report) {}
+
+  /// Nothing after a run of no step; with `report full`, all counters too, after any. Collective.
+  void tell();
+
+ private:
+  const Bed& bed_;
+  WorkMeter& meter_;
+  Report& report_;
+};
+
+}  // namespace solidcull
