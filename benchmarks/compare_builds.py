@@ -19,7 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 OUT = Path(__file__).resolve().parent / "out"
-sys.path[:0] = [str(ROOT / "validation"), str(ROOT / "validation" / "scale")]
+sys.path[:0] = [str(ROOT), str(ROOT / "validation" / "scale")]
 import numpy as np  # noqa: E402
 import scale  # noqa: E402
 from solidcull_runs import beds, errors  # noqa: E402

@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "validation"))
+sys.path.insert(0, str(ROOT))
 from solidcull_runs import engine, errors  # noqa: E402
 from solidcull_runs.beds import settled  # noqa: E402
 from solidcull_runs.errors import RunError  # noqa: E402

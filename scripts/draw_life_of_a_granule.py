@@ -18,11 +18,11 @@ from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch  # noqa: 
 from PIL import Image                                                   # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "validation"))
-from solidcull_runs import pictures  # noqa: E402
+sys.path.insert(0, str(ROOT))
+from solidcull_runs import cutaways, plots  # noqa: E402
 
-EXTERIOR, INTERFACE, INTERIOR, WAKING = (pictures.STATES[s][1] for s in (0, 1, 2, 3))
-MESH, BALL, INK = (0.45, 0.45, 0.45), pictures.STRIKER, "0.15"
+EXTERIOR, INTERFACE, INTERIOR, WAKING = (plots.STATES[s][1] for s in (0, 1, 2, 3))
+MESH, BALL, INK = (0.45, 0.45, 0.45), cutaways.STRIKER, "0.15"
 WAKING_INK = (0.72, 0.36, 0.0)                 # dark enough to be read
 WIDTH, BED_HEIGHT, HEIGHT = 100.0, 22.0, 62.0  # of the page, in its own units
 RADIUS = 1.15                                  # of a granule, mean
@@ -62,7 +62,7 @@ def draw_bed(ax, bottom):
     distance = np.min([np.hypot(x - p[0], y - p[1]) - r for p, r in zip(places[solid], radii[solid])], axis=0)
     ax.contourf(x, y + bottom, distance, [-99, 0.34], colors=[(0.86, 0.86, 0.86)], zorder=1)
     ax.contour(x, y + bottom, distance, [0.34], colors=[MESH], linewidths=2.2, zorder=2)
-    colours = [pictures.STATES[s][1] for s in state[there]]
+    colours = [plots.STATES[s][1] for s in state[there]]
     ax.add_collection(EllipseCollection(2 * radii[there], 2 * radii[there], 0, units="xy", offsets=places[there] + [0, bottom],
                                         transOffset=ax.transData, facecolors=colours, edgecolors=(0, 0, 0, 0.45),
                                         linewidths=0.5, zorder=3))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
-sys.path.insert(0, str(ROOT / "validation"))
+sys.path.insert(0, str(ROOT))
 from solidcull_runs.engine import environment  # noqa: E402
 
 ADAPTERS = ROOT / "fix_solid_cull" / "liggghts"

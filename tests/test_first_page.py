@@ -15,11 +15,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
-sys.path[:0] = [str(ROOT / "validation"), str(ROOT / "validation" / "scale")]
+sys.path[:0] = [str(ROOT), str(ROOT / "validation" / "scale")]
 import published  # noqa: E402
 import scale  # noqa: E402
 import tools  # noqa: E402
-from solidcull_runs import ensembles, first_page, kept, report  # noqa: E402
+from solidcull_runs.validation import case_results, case_runs, first_page, kept_figures, pages, report  # noqa: E402
 from solidcull_runs.errors import RunError  # noqa: E402
 
 README = (ROOT / "README.md").read_text()
@@ -120,9 +120,9 @@ def pour(r):
 
 
 def movers(r):
-    where = {ensembles.MOVED, tools.MOVED / tools.DIAMETER}
+    where = {case_results.MOVED, tools.MOVED / tools.DIAMETER}
     assert len({round(w, 9) for w in where}) == 1, where
-    return [f"1/{1 / ensembles.MOVED:.0f}", str(ensembles.FRAMES)]
+    return [f"1/{1 / case_results.MOVED:.0f}", str(case_runs.FRAMES)]
 
 
 def blade(r):
@@ -306,11 +306,11 @@ class Pages(unittest.TestCase):
 
     def test_first_tables_of_the_cases(self):
         text = (ROOT / "validation" / "RESULTS.md").read_text()
-        titles = {case: next(h for h in re.findall(r"^## (.*)$", text, re.M) if report.anchor(h) == anchor)
+        titles = {case: next(h for h in re.findall(r"^## (.*)$", text, re.M) if pages.anchor(h) == anchor)
                   for case, anchor in re.findall(r"^\| \[(\w+)\]\(#([^)]*)\)", text, re.M)}
         self.assertEqual(len(titles), 20)
-        for head, rows in ((report.FIRST, report.first_rows(self.results.cases, titles)), (report.OUTSIDE, report.outside_rows(self.results.cases, titles))):
-            page = report.Page()
+        for head, rows in ((report.OVERVIEW, report.overview_rows(self.results.cases, titles)), (report.OUTSIDE, report.outside_rows(self.results.cases, titles))):
+            page = pages.Page()
             page.table(head, rows)
             self.assertIn("\n\n" + page.markdown() + "\n", text)
 
@@ -319,7 +319,7 @@ class Pages(unittest.TestCase):
         text, compared_figures = (ROOT / "validation" / "RESULTS.md").read_text(), 0
         sections = dict(re.findall(r"^## (.*?)\n(.*?)(?=^## |\Z)", text, re.M | re.S))
         anchors = dict(re.findall(r"^\| \[(\w+)\]\(#([^)]*)\)", text, re.M))
-        by_anchor = {report.anchor(title): body for title, body in sections.items()}
+        by_anchor = {pages.anchor(title): body for title, body in sections.items()}
         for r in (r for r in self.results.cases if r["main"]):
             rows = {re.sub(r" \([^()]*\)$", "", cells[0]): cells for cells in (
                 line.strip("| ").split(" | ") for line in by_anchor[anchors[r["case"]]].splitlines()) if len(cells) == 10 and re.search(r"\d to ", cells[2])}
@@ -403,9 +403,9 @@ class Publishing(unittest.TestCase):
                                   "exterior": 3000, "interface": 1000, "restored": 2.0})
 
     def test_all_that_is_made_of_them_follows(self):
-        old = kept.read(self.root / first_page.SCALE)
+        old = kept_figures.read(self.root / first_page.SCALE)
         published.publish(published.strike_records(self.report()), self.root)
-        new = kept.read(self.root / first_page.SCALE)
+        new = kept_figures.read(self.root / first_page.SCALE)
         self.assertEqual([r for r in old if r not in new], [r for r in old if (r["what"], r["granules"]) == ("strike", 1280000)])
         self.assertEqual([(r["what"], r["granules"]) for r in new], [(r["what"], r["granules"]) for r in old])
         self.assertRegex((self.root / "README.md").read_text(), r"\| 1,280,000 \| 5,000 s \| 100 \| \*\*depth, end 3\.0 %\*\* \| not known \|")
@@ -428,8 +428,8 @@ class Publishing(unittest.TestCase):
         refused("has no lines '<!-- made of", published.publish, published.strike_records(self.report()), self.root)
         self.assertEqual({file: file.read_bytes() for file in self.root.rglob("*") if file.is_file()}, before)
         (self.root / first_page.SCALE).write_text("[")
-        refused("is no JSON", kept.read, self.root / first_page.SCALE)
-        refused("cannot read", kept.read, self.root / "nowhere.json")
+        refused("is no JSON", kept_figures.read, self.root / first_page.SCALE)
+        refused("cannot read", kept_figures.read, self.root / "nowhere.json")
         refused("have 0 records with", first_page.rows, [], [])
 
     def test_the_commands_refuse_what_is_no_published_run(self):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "validation"), str(ROOT / "validation" / "scale")]
+sys.path[:0] = [str(ROOT), str(ROOT / "validation" / "scale")]
 import culled_files  # noqa: E402
 import lay_culled  # noqa: E402
 import scale  # noqa: E402

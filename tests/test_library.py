@@ -9,7 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
-sys.path.insert(0, str(ROOT / "validation"))
+sys.path.insert(0, str(ROOT))
 from solidcull_runs import engine  # noqa: E402
 
 DRIVER = ROOT / "tests" / "drive_library.py"

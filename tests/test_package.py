@@ -11,7 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
-sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "validation"), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT), str(ROOT / "scripts"), str(ROOT / "tests")]
 import check_words  # noqa: E402
 from solidcull_runs import engine  # noqa: E402
 from test_messages import BLOCK, CULL_BLOCK, VERSION  # noqa: E402

@@ -12,7 +12,7 @@ sys.path.insert(0, str(ROOT / "scripts"))
 import check_words  # noqa: E402
 
 PAGE = Path("fix_solid_cull/theory.md")
-FOLDERS = ("fix_solid_cull", "region_interface_mesh", "tests", "scripts", "benchmarks", "examples", "validation")
+FOLDERS = ("fix_solid_cull", "region_interface_mesh", "tests", "scripts", "benchmarks", "examples", "validation", "solidcull_runs")
 CODE = {".h", ".cpp"}
 TEXT = CODE | {".md", ".py", ".cmake", ".txt", ".sh", ".in"}
 CITED = re.compile(r"theory\.md#([\w-]+)")

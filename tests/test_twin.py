@@ -1,9 +1,12 @@
 """validation/twin.py and solidcull_runs: decks with and without the fix line, logs, figures, and each refusal by its text."""
+import ast
 import base64
 import contextlib
+import graphlib
 import io
 import json
 import os
+import re
 import stat
 import subprocess
 import sys
@@ -17,9 +20,9 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
-sys.path.insert(0, str(ROOT / "validation"))
+sys.path[:0] = [str(ROOT), str(ROOT / "validation")]
 import twin  # noqa: E402
-from solidcull_runs import beds, decks, dumps, engine, errors, few_steps, logs, meshes, metrics, pictures, restarts, shifts, surfaces, tables, twins  # noqa: E402
+from solidcull_runs import beds, comparisons, cutaways, decks, dumps, engine, errors, few_steps, logs, measures, meshes, plots, shifts, tables, twins  # noqa: E402
 
 DECK = """\
 variable dx index 0
@@ -207,9 +210,9 @@ class Decks(Folder):
             at = made.index("label go")
             self.assertEqual(made[at - len(taken_up):at], taken_up)
             self.assertIn("fix cull all solid/cull", made)
-        self.assertTrue(restarts.holds_culled(self.write_bytes("a.restart", b"engine" + b"SDCULLE1" + bytes(56))))
-        self.assertFalse(restarts.holds_culled(self.write_bytes("b.restart", b"engine" * 20)))
-        self.assertFalse(restarts.holds_culled(self.folder / "none.restart"))
+        self.assertTrue(beds.holds_culled(self.write_bytes("a.restart", b"engine" + b"SDCULLE1" + bytes(56))))
+        self.assertFalse(beds.holds_culled(self.write_bytes("b.restart", b"engine" * 20)))
+        self.assertFalse(beds.holds_culled(self.folder / "none.restart"))
 
     def test_a_variable_that_takes_no_value_from_outside_is_refused(self):
         decks.check_vary("s", ["1", "2"], 2, ["variable s index 5", "fix ins all insert/pack seed ${s}"])
@@ -265,7 +268,7 @@ class Logs(Folder):
 class Figures(unittest.TestCase):
     def judged(self, unculled, culled, **more):
         runs = [[twins.Run("r", [], 1.0, metrics={"m": v}) for v in values] for values in (unculled, culled)]
-        return metrics.judge(*runs, margin=0.02, **more)["metrics"]["m"]
+        return comparisons.judge(*runs, margin=0.02, **more)["metrics"]["m"]
 
     def test_margin_is_the_larger_of_two_percent_and_the_floor(self):
         self.assertTrue(self.judged([1.0, 1.0, 1.0], [1.019])["good"])
@@ -282,32 +285,32 @@ class Figures(unittest.TestCase):
     def test_ledger(self):
         kind = [("id", int), ("mass", float)]
         a = np.array([(1, 0.5), (2, 0.5), (3, 0.25)], kind)
-        self.assertEqual(metrics.ledger([a], [a[[0, 2]]]),
+        self.assertEqual(comparisons.ledger([a], [a[[0, 2]]]),
                          {"granules": 3, "granules_of_runs": [3, 3], "lost": 1, "ids_missing": 1, "mass": 1.25, "mass_lost": 0.5})
-        self.assertIsNone(metrics.ledger([a], [a, None]))
-        self.assertEqual(metrics.ledger([a], [a], granules=5)["lost"], 2, "the unculled run counts as little as the culled one")
+        self.assertIsNone(comparisons.ledger([a], [a, None]))
+        self.assertEqual(comparisons.ledger([a], [a], granules=5)["lost"], 2, "the unculled run counts as little as the culled one")
 
     def test_where_chance_says_how_many_granules_come_all_unculled_runs_count(self):
         kind = [("id", int), ("mass", float)]
         a = np.array([(k, 0.5) for k in range(1, 7)], kind)
-        book = metrics.ledger([a[:3], a[[0, 1, 2, 4, 5]]], [a[:4]])
+        book = comparisons.ledger([a[:3], a[[0, 1, 2, 4, 5]]], [a[:4]])
         self.assertEqual((book["granules_of_runs"], book["lost"], book["ids_missing"], book["mass_lost"]), ([3, 5], 0, 0, 0))
-        self.assertEqual([metrics.ledger([a[:3], a[:5]], [culled])["lost"] for culled in (a[:2], a)], [1, -1])
-        self.assertEqual(metrics.ledger([a[:3], a[:5]], [a[1:4]])["ids_missing"], 1, "all unculled runs have granule 1")
+        self.assertEqual([comparisons.ledger([a[:3], a[:5]], [culled])["lost"] for culled in (a[:2], a)], [1, -1])
+        self.assertEqual(comparisons.ledger([a[:3], a[:5]], [a[1:4]])["ids_missing"], 1, "all unculled runs have granule 1")
 
     def test_a_figure_outside_its_margin_is_named(self):
         runs = [[twins.Run("r", [], 1.0, metrics={"good one": 1.0, "bad one": v})] for v in (1.0, 1.1)]
-        text = tables.table(metrics.judge(*runs))
+        text = tables.table(comparisons.judge(*runs))
         self.assertIn("OUTSIDE its margin: bad one\n", text + "\n")
-        self.assertIn("all metrics within their margins", tables.table(metrics.judge(runs[0], runs[0])))
+        self.assertIn("all metrics within their margins", tables.table(comparisons.judge(runs[0], runs[0])))
 
     def test_speed_up_is_of_the_time_in_which_a_run_had_its_core(self):
         unculled, culled = twins.Run("u", [], 10.0, wall=20.0, cpu=10.0), twins.Run("c", [], 4.0, wall=8.0, cpu=8.0)
-        self.assertAlmostEqual(metrics.judge([unculled], [culled])["speed_up"], 5 / 4)
+        self.assertAlmostEqual(comparisons.judge([unculled], [culled])["speed_up"], 5 / 4)
         self.assertEqual(twins.Run("r", [], 3.0).own_time, 3.0)
 
     def test_noise_is_the_largest_distance_of_two_unculled_runs(self):
-        self.assertEqual(metrics.apart([0, 1, 5], [2], lambda a, b: abs(a - b)), ((2 + 1 + 3) / 3, 5))
+        self.assertEqual(comparisons.apart([0, 1, 5], [2], lambda a, b: abs(a - b)), ((2 + 1 + 3) / 3, 5))
 
 
 class Command(Folder):
@@ -438,7 +441,7 @@ class RealDecks(Folder):
     def test_a_restart_file_with_culled_granules(self):
         pack = f"fix ins all insert/pack seed 86028157 distributiontemplate pdd insert_every once {PLACE} particles_in_region 60\n"
         engine.run_liggghts(self.write("fill.in", f"{HEAD}{pack}{LINE}run 12000\nunfix ins\nwrite_restart bed.restart\n"), self.folder, self.folder / "fill.log")
-        self.assertTrue(restarts.holds_culled(self.folder / "bed.restart"))
+        self.assertTrue(beds.holds_culled(self.folder / "bed.restart"))
         head = HEAD.replace("create_box 1 reg", "read_restart bed.restart")
         deck = self.write("in.deck", f"{head}{LINE}variable h equal bound(all,zmax)\nprint \"${{h}}\"\nunfix grav\nfix grav all gravity 9.81 vector 1 0 -1\nrun 1000\n")
         result, _ = twins.compare(deck, ["ke"], out=self.folder / "out", culled=2)
@@ -466,19 +469,19 @@ class Pictures(Folder):
 
     def test_vtp_is_read_in_both_layouts(self):
         for split in (False, True):
-            bed = pictures.read_vtp(self.vtp(split))
+            bed = cutaways.read_vtp(self.vtp(split))
             self.assertEqual(bed["points"].tolist(), [[0, 0, 0], [5, 0, 0], [0, 5, 0]])
             self.assertEqual(bed["radius"].tolist(), [1, 2, 3])
             self.assertEqual(bed["polys"].tolist(), [[0, 1, 2]])
 
     def test_steps_of_files(self):
         self.vtp(False)
-        self.assertEqual(pictures.steps_of(self.folder / "bed.*.vtp"), [100])
+        self.assertEqual(cutaways.steps_of(self.folder / "bed.*.vtp"), [100])
 
     def test_nearer_granules_hide_others(self):
         bed = {"points": np.array([[5.0, 2, 5], [5, 8, 5]]), "radius": np.array([1.0, 1]), "state": np.array([1, 2])}
-        picture = pictures.Picture((0, 0, 0), (10, 10, 10), pixels=40, turn=0, tilt=0)
-        picture.spheres(bed["points"], bed["radius"], [pictures.STATES[s][1] for s in bed["state"]])
+        picture = cutaways.Picture((0, 0, 0), (10, 10, 10), pixels=40, turn=0, tilt=0)
+        picture.spheres(bed["points"], bed["radius"], [plots.STATES[s][1] for s in bed["state"]])
         red, green, blue = picture.image[20, 20]
         self.assertGreater(blue, green)
 
@@ -597,7 +600,7 @@ class Kept(Folder):
 class Files(Folder):
     def test_the_height_map_is_that_of_a_sphere(self):
         granule = np.array([(0.5, 0.5, 0.3, 0.2)], [(c, float) for c in ("x", "y", "z", "radius")])
-        height = surfaces.height_map(granule, (0, 0), (1, 1), 0.01, ground=-1)
+        height = measures.height_map(granule, (0, 0), (1, 1), 0.01, ground=-1)
         self.assertAlmostEqual(height.max(), 0.5, delta=2e-4)
         self.assertAlmostEqual((height > -1).mean(), np.pi * 0.2**2, delta=1e-3)
         self.assertAlmostEqual(height[height > -1].mean(), 0.3 + 2 / 3 * 0.2, delta=1e-3)
@@ -643,6 +646,63 @@ class Drivers(unittest.TestCase):
                 self.assertEqual(done.returncode, 2, done.stderr)
                 self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
                 self.assertIn("no launcher at /nowhere/liggghts-solidcull", done.stderr)
+
+
+class Imports(Folder):
+    """The package's modules: none imports itself by way of others, and the package says what each is for."""
+    PACKAGE = ROOT / "solidcull_runs"
+
+    def modules(self, package):
+        """Its files, by name."""
+        files = {".".join(f.relative_to(package).with_suffix("").parts): f for f in package.rglob("*.py")}
+        return {name: f for name, f in files.items() if not name.endswith("__init__")}
+
+    def imports(self, package):
+        """The modules of the package that each of them imports, at its head or in a function."""
+        files, found = self.modules(package), {}
+        for name, file in files.items():
+            wanted = set()
+            for node in ast.walk(ast.parse(file.read_text())):
+                if isinstance(node, ast.ImportFrom):
+                    here = [package.name, *name.split(".")][:-node.level] if node.level else []
+                    origin = ".".join([*here, *filter(None, [node.module])])
+                    wanted |= {origin} | {f"{origin}.{alias.name}" for alias in node.names}
+                elif isinstance(node, ast.Import):
+                    wanted |= {alias.name for alias in node.names}
+            found[name] = {other for other in files if f"{package.name}.{other}" in wanted}
+        return found
+
+    def circle(self, package):
+        """Modules that import each other, the first again at the end; None where there are none."""
+        try:
+            graphlib.TopologicalSorter(self.imports(package)).prepare()
+        except graphlib.CycleError as e:
+            return e.args[1]
+        return None
+
+    def test_no_circle(self):
+        self.assertIsNone(self.circle(self.PACKAGE))
+
+    def test_what_all_share_needs_nothing_of_validation(self):
+        imports = self.imports(self.PACKAGE)
+        self.assertIn("validation.cases", imports["validation.command"])
+        self.assertIn("errors", imports["validation.command"])
+        self.assertEqual({name: of for name, of in imports.items() if "." not in name and any("." in other for other in of)}, {})
+
+    def test_each_module_has_its_row(self):
+        text = (self.PACKAGE / "__init__.py").read_text()
+        self.assertEqual(sorted(re.findall(r"^\| `([\w.]+)` \| \w", text, re.M)), sorted(self.modules(self.PACKAGE)))
+
+    def test_circles_are_found(self):
+        package = self.folder / "package"
+        (package / "part").mkdir(parents=True)
+        texts = {"__init__": "", "a": "from . import b\n", "b": "import json\n", "part/__init__": "", "part/c": "from ..a import x\n"}
+        for changed in ({}, {"b": "def f():\n    from .a import x\n"}, {"b": "from .part import c\n"}, {"b": "from package.part.c import x\n"},
+                        {"b": "import package.part.c\n"}, {"a": "from package import a\n"}):
+            with self.subTest(changed):
+                for name, text in {**texts, **changed}.items():
+                    (package / f"{name}.py").write_text(text)
+                self.assertEqual(self.circle(package) is None, not changed)
 
 
 if __name__ == "__main__":

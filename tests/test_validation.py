@@ -22,8 +22,9 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
-sys.path.insert(0, str(ROOT / "validation"))
-from solidcull_runs import cases, ensembles, equivalence, few, fields, first_page, judgement, kept, logs, points, publish, report, validate  # noqa: E402
+sys.path.insert(0, str(ROOT))
+from solidcull_runs import logs  # noqa: E402
+from solidcull_runs.validation import case_results, case_runs, cases, command, fields, first_page, kept_figures, pages, points, report, short_cases, verdicts  # noqa: E402
 from solidcull_runs.errors import RunError  # noqa: E402
 
 STORED = ROOT / "tests" / "data" / "validation_result.json"
@@ -101,7 +102,7 @@ class Cases(Folder):
     def test_every_case_of_the_project_can_be_read(self):
         there = cases.names()
         self.assertGreaterEqual(len(there), 1)
-        for size in cases.SIZES:
+        for size in ("quick", "full"):
             for case in cases.load([], size):
                 with self.subTest(f"{case.name} {size}"):
                     self.assertGreater(case.granules(case.main_scene), 0)
@@ -120,15 +121,15 @@ class Points(unittest.TestCase):
 
     def test_frozen_by_hand(self):
         text = "read_restart a\nfix integrate all nve/sphere\nrun 5\n"
-        made = ensembles.frozen_by_hand(text, "sphere 0 0 0 $R", "deck")
+        made = case_runs.frozen_by_hand(text, "sphere 0 0 0 $R", "deck")
         self.assertEqual(made.splitlines()[1:-1], ["region by_hand sphere 0 0 0 $R units box", "group by_hand region by_hand",
                                                    "group frozen subtract all by_hand", "neigh_modify exclude group frozen frozen",
                                                    "velocity frozen set 0 0 0", "fix integrate by_hand nve/sphere"])
         with self.assertRaises(RunError):
-            ensembles.frozen_by_hand("run 5\n", "sphere", "deck")
+            case_runs.frozen_by_hand("run 5\n", "sphere", "deck")
 
     def test_cut_short(self):
-        self.assertEqual(few.cut_short("run 500\nrun ${steps} upto\nrun 0\nrun_time 5\n", 40), "run 40\nrun 40\nrun 0\nrun_time 5\n")
+        self.assertEqual(short_cases.cut_short("run 500\nrun ${steps} upto\nrun 0\nrun_time 5\n", 40), "run 40\nrun 40\nrun 0\nrun_time 5\n")
 
 
 Job = collections.namedtuple("Job", "scene point k")
@@ -148,7 +149,7 @@ class Ledger(unittest.TestCase):
         return done
 
     def lost(self, *given, refilled=False):
-        return ensembles.lost(self.runs((points.UNCULLED, 5, range(15)), (points.UNCULLED, 3, range(13)), *given),
+        return case_results.lost(self.runs((points.UNCULLED, 5, range(15)), (points.UNCULLED, 3, range(13)), *given),
                               types.SimpleNamespace(scenes=[""]), refilled)
 
     def test_what_was_put_in_counts(self):
@@ -175,40 +176,40 @@ class Ledger(unittest.TestCase):
 class Statistics(unittest.TestCase):
     def test_two_one_sided_tests(self):
         a, b = dict(enumerate([1.0, 1.1, 0.9, 1.05, 0.95])), dict(enumerate([1.02, 1.08, 0.99]))
-        v = equivalence.judged(a, b, 0.2)
+        v = verdicts.two_one_sided_tests(a, b, 0.2)
         pairs = [0.02, -0.02, 0.09]
         self.assertAlmostEqual(v.difference, 0.03, 12)
         self.assertAlmostEqual(v.high - v.difference, 2.920 * statistics.stdev(pairs) / math.sqrt(3), 4)  # Student's t: 95 %, 2 degrees
-        self.assertEqual(v.word, equivalence.SAME)
-        self.assertEqual(equivalence.judged(a, b, 0.05).word, equivalence.OPEN)
-        self.assertEqual(equivalence.judged(a, {k: x + 1 for k, x in b.items()}, 0.2).word, equivalence.OTHER)
+        self.assertEqual(v.word, verdicts.SAME)
+        self.assertEqual(verdicts.two_one_sided_tests(a, b, 0.05).word, verdicts.OPEN)
+        self.assertEqual(verdicts.two_one_sided_tests(a, {k: x + 1 for k, x in b.items()}, 0.2).word, verdicts.OTHER)
         self.assertAlmostEqual(v.in_margins, 0.15, 12)
 
     def test_what_the_start_does_is_in_neither_run_of_a_pair(self):
         a = {0: 1.0, 1: 2.0, 2: 3.0}
-        self.assertEqual(equivalence.judged(a, {0: 1.01, 1: 2.02, 2: 3.01}, 0.1).word, equivalence.SAME)
-        self.assertEqual(equivalence.judged(a, {0: 2.01, 1: 3.02, 2: 1.01}, 0.1).word, equivalence.OPEN)
+        self.assertEqual(verdicts.two_one_sided_tests(a, {0: 1.01, 1: 2.02, 2: 3.01}, 0.1).word, verdicts.SAME)
+        self.assertEqual(verdicts.two_one_sided_tests(a, {0: 2.01, 1: 3.02, 2: 1.01}, 0.1).word, verdicts.OPEN)
 
     def test_scatter_is_no_equivalence(self):
         """Runs that differ by nothing on average, but scatter by more than the margin, show nothing."""
-        self.assertEqual(equivalence.judged(dict(enumerate([0, 10, -10, 5, -5])), dict(enumerate([10, 0, -10])), 1).word, equivalence.OPEN)
-        self.assertEqual(equivalence.judged(dict(enumerate([0, 10, -10, 5, -5])), {0: 0}, 1).word, equivalence.OPEN)
-        self.assertEqual(equivalence.judged({0: 1, 1: 1}, {0: 1, 1: 1}, 0.1).word, equivalence.SAME)
+        self.assertEqual(verdicts.two_one_sided_tests(dict(enumerate([0, 10, -10, 5, -5])), dict(enumerate([10, 0, -10])), 1).word, verdicts.OPEN)
+        self.assertEqual(verdicts.two_one_sided_tests(dict(enumerate([0, 10, -10, 5, -5])), {0: 0}, 1).word, verdicts.OPEN)
+        self.assertEqual(verdicts.two_one_sided_tests({0: 1, 1: 1}, {0: 1, 1: 1}, 0.1).word, verdicts.SAME)
         for a, b in (({0: 1}, {0: 1}), ({0: 1, 1: 2}, {5: 1})):
             with self.assertRaises(ValueError):
-                equivalence.judged(a, b, 1)
+                verdicts.two_one_sided_tests(a, b, 1)
 
     def test_order(self):
         tolerances = [1, 3, 10, 30]
-        self.assertAlmostEqual(equivalence.order(tolerances, [0.1 * t**0.7 for t in tolerances], 0.0), 0.7, 12)
-        self.assertIsNone(equivalence.order(tolerances, [0.1, 0.1, 0.1, 0.5], 0.2))
-        self.assertAlmostEqual(equivalence.order(tolerances, [0.1, 0.1, 1, 3], 0.2), 1, 12)
+        self.assertAlmostEqual(verdicts.order(tolerances, [0.1 * t**0.7 for t in tolerances], 0.0), 0.7, 12)
+        self.assertIsNone(verdicts.order(tolerances, [0.1, 0.1, 0.1, 0.5], 0.2))
+        self.assertAlmostEqual(verdicts.order(tolerances, [0.1, 0.1, 1, 3], 0.2), 1, 12)
 
 
 class Fields(unittest.TestCase):
     def bed(self, shift=0.0, n=400):
         rng = np.random.default_rng(3)
-        g = np.zeros(n, [(c, float) for c in ensembles.COLUMNS])
+        g = np.zeros(n, [(c, float) for c in case_runs.COLUMNS])
         for c in "xyz":
             g[c] = rng.uniform(0, 0.03, n)
         g["x"] += shift
@@ -235,14 +236,14 @@ class Fields(unittest.TestCase):
 
 class Report(Folder):
     def stored(self):
-        return report.read_result(STORED)
+        return case_results.read_result(STORED)
 
     def test_of_a_stored_result(self):
         result = self.stored()
         folder = self.folder / "report"
         report.write([result], folder, None, "From a test.")
         text, page = (folder / "README.md").read_text(), (folder / "report.html").read_text()
-        judged = judgement.judge(result)
+        judged = verdicts.judge(result)
         sleep = judged["sleep 3 0"]
         self.assertIn(f"| {sleep.speed_up:.2f} | {sleep.error:.2f} ({sleep.worst}) | {sleep.word} |", text)
         for part in ("Slow impact craters", "frozen by hand", "depth ~ density^p", "solid fraction", "error ~ tolerance^p"):
@@ -258,33 +259,33 @@ class Report(Folder):
 
     def test_judged_as_by_hand(self):
         result = self.stored()
-        scene = judgement.main_scene(result)
+        scene = verdicts.main_scene(result)
         u = {r["k"]: r["values"]["depth"] for r in scene["points"]["unculled"]["runs"]}
         c = {r["k"]: r["values"]["depth"] for r in scene["points"]["sleep 3 0"]["runs"]}
-        j = judgement.judge(result)["sleep 3 0"]
+        j = verdicts.judge(result)["sleep 3 0"]
         self.assertAlmostEqual(j.verdicts["depth"].in_margins, abs(statistics.fmean(c[k] - u[k] for k in c)) / (0.02 * statistics.fmean(u.values())), 9)
         self.assertAlmostEqual(j.of_unculled, statistics.median(r["seconds"] for r in scene["points"]["sleep 3 0"]["runs"])
                                / statistics.median(r["seconds"] for r in scene["points"]["unculled"]["runs"]), 12)
 
     def test_too_few_runs_are_not_judged(self):
         result = self.stored()
-        for entry in judgement.main_scene(result)["points"].values():
+        for entry in verdicts.main_scene(result)["points"].values():
             entry["runs"] = entry["runs"][:1]
-        self.assertEqual(judgement.judge(result), {})
+        self.assertEqual(verdicts.judge(result), {})
         report.write([result], self.folder / "report")
         self.assertIn("There are too few runs to judge.", (self.folder / "report" / "README.md").read_text())
 
     def test_wrong_files(self):
         file = self.folder / "results.json"
-        self.refused("run the case first", report.read_result, file)
+        self.refused("run the case first", case_results.read_result, file)
         file.write_text("{")
-        self.refused("is no JSON", report.read_result, file)
+        self.refused("is no JSON", case_results.read_result, file)
         file.write_text("[1]")
-        self.refused("is not the result of a case", report.read_result, file)
+        self.refused("is not the result of a case", case_results.read_result, file)
         result = json.loads(STORED.read_text())
-        del judgement.main_scene(result)["points"]["live 3 0"]["runs"][0]["values"]["depth"]
+        del verdicts.main_scene(result)["points"]["live 3 0"]["runs"][0]["values"]["depth"]
         file.write_text(json.dumps(result))
-        self.refused("live 3 0 has values of", report.read_result, file)
+        self.refused("live 3 0 has values of", case_results.read_result, file)
         self.refused("no case has results to report", report.write, [], self.folder / "report")
 
 
@@ -293,9 +294,9 @@ class Publish(Folder):
 
     def root(self, marks=True):
         root = self.folder / "root"
-        for name, begin in (("README.md", first_page.BEGIN), ("examples/impact/RESULTS.md", publish.BEGIN)):
+        for name, begin in (("README.md", first_page.BEGIN), ("examples/impact/RESULTS.md", report.BEGIN)):
             (root / name).parent.mkdir(parents=True, exist_ok=True)
-            (root / name).write_text(f"before\n\n{begin}\nold\n{kept.END if marks else ''}\n\nafter\n")
+            (root / name).write_text(f"before\n\n{begin}\nold\n{pages.END if marks else ''}\n\nafter\n")
         (root / first_page.SCALE).parent.mkdir(parents=True)
         shutil.copy(ROOT / first_page.SCALE, root / first_page.SCALE)
         return root
@@ -303,19 +304,19 @@ class Publish(Folder):
     def results(self, **of_a_case):
         """The stored result, told of as each case that has a row in README.md, and as the impact."""
         names = [case for case, _ in first_page.ROWS if case] + ["impact"]
-        return [{**report.read_result(STORED), "case": name, **of_a_case} for name in names]
+        return [{**case_results.read_result(STORED), "case": name, **of_a_case} for name in names]
 
     def published(self, results, root):
         page = report.write(results, self.folder / "report", None, "From a test.")
-        publish.publish(results, page, self.folder / "report", root)
+        report.publish(results, page, self.folder / "report", root)
 
     def test_results_file_and_pages(self):
         results, root = self.results(), self.root()
         self.published(results, root)
-        sleep = judgement.judge(results[0])["sleep 3 0"]
+        sleep = verdicts.judge(results[0])["sleep 3 0"]
         readme = (root / "README.md").read_text()
         self.assertNotIn("old", readme)
-        self.assertTrue(readme.startswith(f"before\n\n{first_page.BEGIN}\n| scene |") and readme.endswith(f"|\n{kept.END}\n\nafter\n"), readme)
+        self.assertTrue(readme.startswith(f"before\n\n{first_page.BEGIN}\n| scene |") and readme.endswith(f"|\n{pages.END}\n\nafter\n"), readme)
         self.assertIn("| [heap, fed on its top](validation/cases/fed_heap/README.md), 4000 kg/m3 from 0.1 m | 6,001 | 5.", readme)
         self.assertIn(f" s | {sleep.speed_up:.1f} | ", readme)
         self.assertEqual(readme.count("| 6,001 |"), 4, "the four cases; the strike is of another file")
@@ -324,18 +325,18 @@ class Publish(Folder):
         text = (root / "validation" / "RESULTS.md").read_text()
         self.assertEqual(re.findall(r"!\[.*?\]\((.*?)\)", text), ["all.png"])
         self.assertGreater((root / "validation" / "all.png").stat().st_size, 5000)
-        records = kept.read(root / first_page.CASES)
-        self.assertEqual(records, [record for r in results for record in kept.records_of(r)])
-        self.assertEqual(first_page.readme(root, records, kept.read(root / first_page.SCALE)), readme, "made of the files alone")
+        records = kept_figures.read(root / first_page.CASES)
+        self.assertEqual(records, [record for r in results for record in kept_figures.records_of(r)])
+        self.assertEqual(first_page.readme(root, records, kept_figures.read(root / first_page.SCALE)), readme, "made of the files alone")
         self.published(results, root)
         self.assertEqual((root / "README.md").read_text(), readme, "a second time changes nothing")
 
     def test_records_say_what_was_judged(self):
-        result = report.read_result(STORED)
-        record, live = kept.records_of(result)[:2]
-        judged = judgement.judge(result)["sleep 3 0"]
-        unculled = judgement.unculled_of(judgement.main_scene(result))
-        depths = list(judgement.values_of(unculled, "depth").values())
+        result = case_results.read_result(STORED)
+        record, live = kept_figures.records_of(result)[:2]
+        judged = verdicts.judge(result)["sleep 3 0"]
+        unculled = verdicts.unculled_of(verdicts.main_scene(result))
+        depths = list(verdicts.values_of(unculled, "depth").values())
         mean = statistics.fmean(depths)
         self.assertEqual((record["case"], record["main"], record["mode"], live["mode"]), ("slow_impact", True, "sleep", "live"))
         self.assertEqual((record["faster"], record["verdict"]), (round(judged.speed_up, 2), judged.word))
@@ -351,24 +352,24 @@ class Publish(Folder):
         name, scene = list(results[0]["scenes"].items())[1]
         for run in scene["points"]["sleep 3 0"]["runs"]:
             run["values"]["depth"] *= 2
-        records = [record for r in results for record in kept.records_of(r)]
+        records = [record for r in results for record in kept_figures.records_of(r)]
         titles = {r["case"]: r["title"] for r in results}
-        page = report.first_rows(records, titles)
+        page = report.overview_rows(records, titles)
         self.assertEqual([r[0].partition(", ")[2] for r in page[:2]], list(results[0]["scenes"]))
         self.assertRegex(page[1][5], r"^\d+\.\d+ \(depth\)$")
         self.assertEqual(page[1][6], "outside", name)
         told, = (r for r in report.outside_rows(records, titles) if r[2] == "depth")
         percent = float(told[3].removesuffix(" %"))
         self.assertTrue(90 < percent < 110, told)
-        self.assertRegex(first_page.rows(records, kept.read(ROOT / first_page.SCALE))[0][4], rf"^\*\*.*{re.escape(name)}: depth 1?\d\d %")
+        self.assertRegex(first_page.rows(records, kept_figures.read(ROOT / first_page.SCALE))[0][4], rf"^\*\*.*{re.escape(name)}: depth 1?\d\d %")
 
     def test_a_mode_that_was_not_run(self):
-        result = report.read_result(STORED)
+        result = case_results.read_result(STORED)
         for scene in result["scenes"].values():
             del scene["points"]["live 3 0"]
-        records = kept.records_of(result)
+        records = kept_figures.records_of(result)
         self.assertEqual([(r["faster"], r["off"]) for r in records if r["mode"] == "live"], [(None, [])] * 2)
-        self.assertEqual(report.first_rows(records, {"slow_impact": "A"})[0][-3:], ["-", "-", "not run"])
+        self.assertEqual(report.overview_rows(records, {"slow_impact": "A"})[0][-3:], ["-", "-", "not run"])
         for r in records:
             r.update(case="fed_heap", faster=None, off=[])
         self.refused("fed_heap was not run with `exterior sleep`", first_page.rows, records, [])
@@ -380,7 +381,7 @@ class Publish(Folder):
 
     def test_nothing_is_written_of_too_few_runs(self):
         results, root = self.results(), self.root()
-        for entry in judgement.main_scene(results[1])["points"].values():
+        for entry in verdicts.main_scene(results[1])["points"].values():
             entry["runs"] = entry["runs"][:1]
         self.refused("penetration has too few runs to publish", self.published, results, root)
         self.assertFalse((root / first_page.CASES).exists())
@@ -388,8 +389,8 @@ class Publish(Folder):
     def test_only_full_runs_of_all_cases_are_published(self):
         for words in (["--publish"], ["--publish", "--full", "silo"], ["--publish", "--full", "--also", "calm 3"]):
             with self.assertRaises(SystemExit), open(os.devnull, "w") as nowhere, contextlib.redirect_stderr(nowhere):
-                validate.options(words)
-        self.assertTrue(validate.options(["--publish", "--full"]).publish)
+                command.options(words)
+        self.assertTrue(command.options(["--publish", "--full"]).publish)
 
 
 class Command(Folder):
@@ -400,8 +401,8 @@ class Command(Folder):
         launcher.write_text(f"#!/bin/sh\n{script}\n")
         launcher.chmod(launcher.stat().st_mode | stat.S_IXUSR)
         out = self.folder / "out"
-        done = subprocess.run(["/usr/bin/python3", "-m", "solidcull_runs.validate", "--out", str(out), "--report", str(self.folder / "report"), *words],
-                              cwd=ROOT / "validation", stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=120,
+        done = subprocess.run(["/usr/bin/python3", "-m", "solidcull_runs.validation.command", "--out", str(out), "--report", str(self.folder / "report"), *words],
+                              cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=120,
                               env={**os.environ, "SOLIDCULL_LAUNCHER": str(launcher)})
         return done.returncode, done.stderr.splitlines()
 
@@ -424,7 +425,7 @@ class Decks(unittest.TestCase):
     @unittest.skipUnless(shutil.which("liggghts") and (ROOT / "build" / "liggghts-solidcull").exists(), "no engine")
     def test_every_deck_for_a_few_steps(self):
         with tempfile.TemporaryDirectory() as folder:
-            done = subprocess.run(["/usr/bin/python3", "-m", "solidcull_runs.validate", "--few-steps", "--out", folder], cwd=ROOT / "validation",
+            done = subprocess.run(["/usr/bin/python3", "-m", "solidcull_runs.validation.command", "--few-steps", "--out", folder], cwd=ROOT,
                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=500)
         self.assertEqual(done.returncode, 0, done.stderr)
         for name in cases.names():

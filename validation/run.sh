@@ -7,4 +7,4 @@ set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 "$here/../scripts/prepare.sh" liggghts-solidcull
 cd "$here"
-exec /usr/bin/python3 -m solidcull_runs.validate "$@"
+PYTHONPATH=$here/..${PYTHONPATH:+:$PYTHONPATH} exec /usr/bin/python3 -m solidcull_runs.validation.command "$@"

@@ -22,7 +22,8 @@ import json
 import sys
 from pathlib import Path
 
-from solidcull_runs import decks, errors, metrics, plots, tables, twins
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from solidcull_runs import comparisons, decks, errors, plots, tables, twins  # noqa: E402
 
 
 def assignment(text):
@@ -45,7 +46,7 @@ def main(argv=None):
     p.add_argument("--var", type=assignment, action="append", default=[], metavar="VAR=VALUE", help="for every run")
     p.add_argument("--ranks", type=int, default=1, metavar="N", help="MPI ranks of each run (default 1)")
     p.add_argument("--at-once", type=int, default=1, metavar="N", help="runs at the same time (default 1)")
-    p.add_argument("--margin", type=float, default=metrics.MARGIN, help=f"relative margin of each metric (default {metrics.MARGIN})")
+    p.add_argument("--margin", type=float, default=comparisons.MARGIN, help=f"relative margin of each metric (default {comparisons.MARGIN})")
     p.add_argument("--plot", action="store_true", help="also draw the columns against the step")
     a = p.parse_args(argv)
     wanted = [m.strip() for m in a.metrics.split(",") if m.strip()]

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[1] / "validation"))
-from solidcull_runs import dumps, errors, examples, meshes, pictures, plots, tables  # noqa: E402
-from solidcull_runs.surfaces import height_map  # noqa: E402
+sys.path.insert(0, str(HERE.parents[1]))
+from solidcull_runs import cutaways, dumps, errors, examples, meshes, plots, tables  # noqa: E402
+from solidcull_runs.measures import height_map  # noqa: E402
 
 RADIUS, LENGTH, FACETS = 0.1, 0.06, 48     # m, m, number: the drum
 DIAMETER = 0.005                           # m: mean of the granules
@@ -89,7 +89,7 @@ def plot(runs, file):
 def moments(out, steps, runs):
     start = runs["unculled"][0].series("c_moving")[0][0]
     for step in sorted({steps[round(k)] for k in np.linspace(0, len(steps) - 1, SHOWN)}):
-        images = pictures.cut_away_files(out, step, LENGTH / 2, (-RADIUS, LENGTH / 2, -RADIUS), (RADIUS, LENGTH, 0.8 * RADIUS))
+        images = cutaways.cut_away_files(out, step, LENGTH / 2, (-RADIUS, LENGTH / 2, -RADIUS), (RADIUS, LENGTH, 0.8 * RADIUS))
         yield (f"turned by {np.degrees(turned(step - start)):.0f}°", *images)
 
 

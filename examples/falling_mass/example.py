@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[1] / "validation"))
-from solidcull_runs import errors, examples, pictures, plots, tables  # noqa: E402
-from solidcull_runs.metrics import MARGIN, apart  # noqa: E402
-from solidcull_runs.surfaces import height_map  # noqa: E402
+sys.path.insert(0, str(HERE.parents[1]))
+from solidcull_runs import cutaways, errors, examples, plots, tables  # noqa: E402
+from solidcull_runs.comparisons import MARGIN, apart  # noqa: E402
+from solidcull_runs.measures import height_map  # noqa: E402
 
 FRAME_RATE = 24                      # 1/s
 SHIFTS = (0, 2e-7, -2e-7)            # m: how far each granule is moved in each pair of runs, 1e-5 granule diameters
@@ -115,7 +115,7 @@ def plot(runs, file):
         time.plot(frame, seconds, **style)
         count.plot(frame, atoms, **style)
         shape.plot((np.arange(len(run.profile)) + 0.5) * RING, run.profile, **style)
-    count.plot(frame, np.median([exterior(r) for r in runs["culled"]], axis=0), color=pictures.STATES[0][1], lw=1.5,
+    count.plot(frame, np.median([exterior(r) for r in runs["culled"]], axis=0), color=plots.STATES[0][1], lw=1.5,
                label="culled: exterior alone")
     time.set(ylabel="frame time (s)", ylim=(0, None))
     count.set(xlabel="frame", ylabel="granules in LIGGGHTS", ylim=(0, None))
@@ -132,7 +132,7 @@ def moments(out, steps, runs):
     named = {frame * in_frame: name for frame, name in MOMENTS.items()} if in_frame * max(MOMENTS) <= steps[-1] else {steps[-1]: "the last"}
     for step, name in named.items():
         frame = step // in_frame
-        images = pictures.cut_away_files(out, step, 0, *SHOWN)
+        images = cutaways.cut_away_files(out, step, 0, *SHOWN)
         yield (f"{name}: frame {frame}, {frame / FRAME_RATE:.2f} s", *(images or (None,)))
 
 

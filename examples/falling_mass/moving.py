@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[1] / "validation"))
+sys.path.insert(0, str(HERE.parents[1]))
 from solidcull_runs import engine, errors, logs  # noqa: E402
 
 OUT = HERE / "out"

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[1] / "validation"))
-from solidcull_runs import errors, examples, pictures, plots  # noqa: E402
+sys.path.insert(0, str(HERE.parents[1]))
+from solidcull_runs import cutaways, errors, examples, plots  # noqa: E402
 from solidcull_runs.dumps import read_final  # noqa: E402
-from solidcull_runs.surfaces import height_map  # noqa: E402
+from solidcull_runs.measures import height_map  # noqa: E402
 
 BOX, DEPTH, STRIKER = 0.075, 0.062, 0.005  # m: width of the bed, height shown, larger radii are the ball
 TIME_STEP = 3e-5                           # s
@@ -52,7 +52,7 @@ def moments(out, steps, runs):
     steps = steps[1:]  # before the first one nothing has been struck
     for step in sorted({steps[round(k) - 1] for k in np.geomspace(1, len(steps), SHOWN)}):
         yield (f"{milliseconds(step):.0f} ms",
-               *pictures.cut_away_files(out, step, BOX / 2, (0, 0, 0), (BOX, BOX, DEPTH), striker_radius=STRIKER))
+               *cutaways.cut_away_files(out, step, BOX / 2, (0, 0, 0), (BOX, BOX, DEPTH), striker_radius=STRIKER))
 
 
 IMPACT = examples.Example(

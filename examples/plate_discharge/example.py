@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[1] / "validation"))
-from solidcull_runs import beds, dumps, engine, errors, few_steps, logs, metrics, pictures, plots, tables, twins  # noqa: E402
-from solidcull_runs.surfaces import rms  # noqa: E402
+sys.path.insert(0, str(HERE.parents[1]))
+from solidcull_runs import beds, comparisons, cutaways, dumps, engine, errors, few_steps, logs, plots, tables, twins  # noqa: E402
+from solidcull_runs.measures import rms  # noqa: E402
 
 TIME_STEP, START = 1e-4, 0.75                    # s: of LIGGGHTS; when the walls vanish
 DIAMETER, PLATE = 0.01, 0.4                      # m: of the granules; height of the plate
@@ -63,7 +63,7 @@ def history(run, out):
     """Times (s) and angles of both heaps, from files that hold every granule."""
     if run.counts:
         files = out / f"{run.name}.bed.*.vtp"
-        places = [(step, pictures.read_vtp(pictures.file_at(files, step))["points"]) for step in pictures.steps_of(files)]
+        places = [(step, cutaways.read_vtp(cutaways.file_at(files, step))["points"]) for step in cutaways.steps_of(files)]
     else:
         places = [(step, at) for step, _, at in dumps.snapshots(out / f"{run.name}.places")]
     return np.array([[step * TIME_STEP, *angles(at[:, 0], at[:, 1])] for step, at in places]).reshape(-1, 3).T
@@ -143,23 +143,23 @@ def plot(runs, file):
 def draw(run, out, file, pixels=900):
     """The whole scene from the front, at four moments, by state; False without bed files."""
     files = out / f"{run.name}.bed.*.vtp"
-    steps = pictures.steps_of(files)
+    steps = cutaways.steps_of(files)
     if not steps:
         return False
     shown = sorted({steps[round(k)] for k in np.linspace(0, len(steps) - 1, 4)})
     figure, axes = plots.plt.subplots(1, len(shown), squeeze=False, figsize=(4 * len(shown), 3.6))
     for ax, step in zip(axes[0], shown):
-        bed = pictures.read_vtp(pictures.file_at(files, step))
+        bed = cutaways.read_vtp(cutaways.file_at(files, step))
         # pictures look along y with z up: here they look along -z with y up, at the front half cut away
         at = bed["points"][:, [0, 2, 1]] * (1, -1, 1)
         front = at[:, 1] > -0.1
-        image = pictures.Picture((-0.5, -0.1, 0), (0.5, 0, 0.7), pixels, turn=0, tilt=0)
-        image.spheres(at[front], bed["radius"][front].astype(float), pictures.colours_of(bed)[front])
+        image = cutaways.Picture((-0.5, -0.1, 0), (0.5, 0, 0.7), pixels, turn=0, tilt=0)
+        image.spheres(at[front], bed["radius"][front].astype(float), cutaways.colours_of(bed)[front])
         ax.imshow(image.image)
         ax.plot([0.05 * pixels, 0.95 * pixels], 2 * [(0.7 - PLATE) * pixels], color="0.3", lw=1.5)
         ax.set_title(f"{step * TIME_STEP:.1f} s")
         ax.axis("off")
-    pictures.legend(figure, mesh=False)
+    cutaways.legend(figure, mesh=False)
     plots.save(figure, file, rect=(0, 0.08, 1, 1), dpi=110)
     return True
 
@@ -171,7 +171,7 @@ def profile_text(runs):
         of = {kind: [r.surfaces[k] for r in runs[kind]] for kind in twins.KINDS}
         if all(np.isnan(surface).all() for surface in of["unculled"]):
             continue
-        error, noise = metrics.apart(of["unculled"], of["culled"], rms)
+        error, noise = comparisons.apart(of["unculled"], of["culled"], rms)
         lines.append(f"surface of the {name}: culled from unculled {error / DIAMETER:.2f} d rms" +
                      (f", unculled among themselves {noise / DIAMETER:.2f} d" if noise else ""))
     return "\n".join(lines)
@@ -200,7 +200,7 @@ def main(argv=None):
         return 0
     if few:
         few_steps.check(runs, granules, steps)
-    result = metrics.judge(runs["unculled"], runs["culled"], granules=granules)
+    result = comparisons.judge(runs["unculled"], runs["culled"], granules=granules)
     times = [result[kind]["own_time"] + fill_time for kind in twins.KINDS]
     text = (f"{tables.explained(result)}\n\n{profile_text(runs)}\nwith the {START} s of filling, as the benchmark counts: "
             f"{times[0]:.0f} s against {times[1]:.0f} s, {times[0] / times[1]:.2f} times faster")
@@ -210,7 +210,7 @@ def main(argv=None):
     plot(runs, out / f"plot{length}.png")
     drawn = draw(runs["culled"][0], out, out / f"side{length}.png")
     print(f"\n{text}\n\nplot: {out / f'plot{length}.png'}\n" + (f"picture: {out / f'side{length}.png'}" if drawn else "no picture: the fix wrote no files"))
-    return 1 if not drawn or metrics.is_lost(result["ledger"]) else 0
+    return 1 if not drawn or comparisons.is_lost(result["ledger"]) else 0
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[1] / "validation"))
+sys.path.insert(0, str(HERE.parents[1]))
 from solidcull_runs import errors  # noqa: E402
 from solidcull_runs.dumps import snapshots  # noqa: E402
 

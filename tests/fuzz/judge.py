@@ -8,7 +8,7 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "validation"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from solidcull_runs.engine import environment  # noqa: E402
 
 D = 0.003            # m: the largest diameter of a deck

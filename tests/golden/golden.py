@@ -27,7 +27,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[1] / "validation"))
+sys.path.insert(0, str(HERE.parents[1]))
 from solidcull_runs import meshes  # noqa: E402
 from solidcull_runs.engine import environment  # noqa: E402
 

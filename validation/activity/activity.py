@@ -21,12 +21,12 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 MOTION = HERE.parent / "motion"
-sys.path.insert(0, str(HERE.parent))
-from solidcull_runs import beds, errors, few_steps, meshes, metrics, tables, twins  # noqa: E402
+sys.path.insert(0, str(HERE.parents[1]))
+from solidcull_runs import beds, comparisons, errors, few_steps, meshes, tables, twins  # noqa: E402
 from solidcull_runs.dumps import element_forces, read_final  # noqa: E402
 from solidcull_runs.meshes import grid  # noqa: E402
-from solidcull_runs.metrics import check  # noqa: E402
-from solidcull_runs.surfaces import centre_height, height_map, outside, rms  # noqa: E402
+from solidcull_runs.comparisons import check  # noqa: E402
+from solidcull_runs.measures import centre_height, height_map, outside, rms  # noqa: E402
 
 OUT = HERE / "out"                               # meshes and beds
 DIAMETER = 0.00275                               # m: mean, of the beds that wake
@@ -128,7 +128,7 @@ def bed_figures(run, size):
 def map_check(runs, start, size):
     """Rms difference of the surfaces: culled from unculled (mean over pairs), against the largest of two unculled ones."""
     maps = {kind: [r.map for r in runs[kind]] for kind in twins.KINDS}
-    error, noise = metrics.apart(maps["unculled"], maps["culled"], rms)
+    error, noise = comparisons.apart(maps["unculled"], maps["culled"], rms)
     relief = rms(maps["unculled"][0], height_map(read_final(start), (0, 0), size, CELL))
     return [check("surface, rms difference culled - unculled (m), of the unculled runs'", error, max(noise, 0.02 * relief))]
 
@@ -149,7 +149,7 @@ def compare(part, deck, figures, variables, granules, steps_if_few, locks=True, 
 def report(scene, parts, checks=(), notes=()):
     """Prints a scene's tables and checks, writes its JSON; its verdict: "good", "outside" or "lost"."""
     tables.print_scene(parts, checks, notes)
-    lost = any(metrics.is_lost(r["ledger"]) for r in parts.values())
+    lost = any(comparisons.is_lost(r["ledger"]) for r in parts.values())
     good = all(r["good"] for r in parts.values()) and all(c["good"] for c in checks)
     verdict = "lost" if lost else "good" if good else "outside"
     (results() / f"{scene}.json").write_text(json.dumps({"verdict": verdict, "fix": options.fix, "runs": options.runs, "few_steps": options.few_steps,

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(HERE.parents[1]))
 from solidcull_runs import errors, few_steps, tables, twins  # noqa: E402
-from solidcull_runs.metrics import check  # noqa: E402
+from solidcull_runs.comparisons import check  # noqa: E402
 
 OUT = HERE / "out"  # out/few with --few-steps
 GRAVITY = 9.81      # m/s^2

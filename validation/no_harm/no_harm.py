@@ -16,9 +16,10 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
-from solidcull_runs import decks, ensembles, errors, logs  # noqa: E402
-from solidcull_runs.cases import Case, CASES  # noqa: E402
+sys.path.insert(0, str(HERE.parents[1]))
+from solidcull_runs import decks, errors, logs  # noqa: E402
+from solidcull_runs.validation import case_runs  # noqa: E402
+from solidcull_runs.validation.cases import Case, CASES  # noqa: E402
 from solidcull_runs.engine import Process, find_launcher  # noqa: E402
 
 OUT = HERE / "out"
@@ -75,8 +76,8 @@ class Runs:
         self.name = f"{scene}-{granules}-{mode}"
         self.case, self.out = case_of(scene, granules), out
         (key,) = self.case.scenes
-        bed = ensembles.make_beds([self.case], out, 1, lambda line: print(f"  {line}", flush=True))[self.case.name, key]
-        self.variables = {**self.case.variables(key), **ensembles.files_of(self.case, key, out), **({"restart": bed} if bed else {})}
+        bed = case_runs.make_beds([self.case], out, 1, lambda line: print(f"  {line}", flush=True))[self.case.name, key]
+        self.variables = {**self.case.variables(key), **case_runs.files_of(self.case, key, out), **({"restart": bed} if bed else {})}
         self.keywords = f"exterior {mode} {keywords or ''}".strip()
 
     def start(self, culled, core):

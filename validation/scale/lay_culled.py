@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(HERE.parents[1]))
 import culled_files as files  # noqa: E402
 import tiles  # noqa: E402
 from solidcull_runs import errors  # noqa: E402

@@ -8,10 +8,10 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
-from solidcull_runs import errors, first_page, kept  # noqa: E402
-from solidcull_runs.first_page import percent, times  # noqa: E402
-from solidcull_runs.report import Page  # noqa: E402
+sys.path.insert(0, str(HERE.parents[1]))
+from solidcull_runs import errors  # noqa: E402
+from solidcull_runs.validation import first_page, kept_figures, pages  # noqa: E402
+from solidcull_runs.validation.first_page import percent, times  # noqa: E402
 
 STEPS = 8000        # of a strike
 ALONE = 0.1         # cores that others kept busy: below, a run was alone
@@ -130,20 +130,20 @@ def page_text(file, records):
     """The text of RESULTS.md with the tables of these records."""
     text = file.read_text()
     for name, table in TABLES.items():
-        page = Page()
+        page = pages.Page()
         page.table(*table(records))
-        text = kept.between_marks(file, mark(name), page.markdown(), text)
+        text = pages.between_marks(file, mark(name), page.markdown(), text)
     return text
 
 
 def write(root, records):
     """Writes results.json, RESULTS.md, the plot, and README's rows; all texts are there before the first is written."""
     results, page = root / first_page.SCALE, root / "validation" / "scale" / "RESULTS.md"
-    texts = {root / "README.md": first_page.readme(root, kept.read(root / first_page.CASES), records), results: kept.text_of(records),
+    texts = {root / "README.md": first_page.readme(root, kept_figures.read(root / first_page.CASES), records), results: kept_figures.text_of(records),
              page: page_text(page, records)}
     first_page.draw(records, root / first_page.PLOT)
     for file, text in texts.items():
-        kept.write(file, text)
+        pages.write(file, text)
 
 
 def refuse(lost, stale):
@@ -158,11 +158,11 @@ def publish(new, root=first_page.ROOT):
     """Keeps these records beside those of other beds."""
     if not new:
         raise errors.RunError("nothing to publish: no bed was run as a published one is, with and without the line or asleep")
-    write(root, merged(kept.read(root / first_page.SCALE), new))
+    write(root, merged(kept_figures.read(root / first_page.SCALE), new))
 
 
 def main():
-    write(first_page.ROOT, kept.read(first_page.ROOT / first_page.SCALE))
+    write(first_page.ROOT, kept_figures.read(first_page.ROOT / first_page.SCALE))
     return 0
 
 

@@ -27,12 +27,12 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(HERE.parents[1]))
 import culled_files  # noqa: E402
 import lay_culled  # noqa: E402
 import published  # noqa: E402
 import tiles  # noqa: E402
-from solidcull_runs import beds, decks, engine, errors, examples, logs, metrics, plots, tables  # noqa: E402
+from solidcull_runs import beds, comparisons, decks, engine, errors, examples, logs, plots, tables  # noqa: E402
 from solidcull_runs.dumps import element_normal_loads, read_final  # noqa: E402
 from solidcull_runs.meshes import grid, stl_text  # noqa: E402
 
@@ -405,7 +405,7 @@ def compared(runs, kind):
     result["ids_good"] = all(r["ids"] == unculled[0]["ids"] for r in own)
     result["metrics"] = {}
     for name in unculled[0]["metrics"]:
-        result["metrics"][name] = metrics.judged([r["metrics"][name] for r in unculled], [r["metrics"][name] for r in own])
+        result["metrics"][name] = comparisons.judged([r["metrics"][name] for r in unculled], [r["metrics"][name] for r in own])
     if all("crater_near" in r for r in unculled + own):  # runs that were kept may be older
         result["crater_near"] = [statistics.fmean(r["crater_near"] for r in rs) for rs in (unculled, own)]
     if all("element_loads" in r for r in unculled + own):

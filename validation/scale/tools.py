@@ -19,9 +19,9 @@ import numpy as np
 
 import published
 import scale
-from solidcull_runs import decks, errors, logs, meshes, metrics, tables  # scale.py has made them known
+from solidcull_runs import comparisons, decks, errors, logs, meshes, tables  # scale.py has made them known
 from solidcull_runs.dumps import read_final, snapshots
-from solidcull_runs.surfaces import height_map
+from solidcull_runs.measures import height_map
 
 DIAMETER = 0.0026              # m: mean
 MOVED = 0.01 * DIAMETER        # m, between two looks: who does more moves
@@ -165,7 +165,7 @@ def compared(unculled, culled):
             "exterior": mean("exterior"), "interface": mean("interface"), "over_movers": (mean("exterior") + mean("interface")) / max(1, moving),
             "restored": mean("restored") / n * 1e4 / steps, "steps": steps,
             "lost": max((n - r["granules"] for r in culled), key=abs), "ids_good": all(r["ids"] == unculled[0]["ids"] for r in culled),
-            "metrics": {m: metrics.judged([r["metrics"][m] for r in unculled], [r["metrics"][m] for r in culled]) for m in unculled[0]["metrics"]}}
+            "metrics": {m: comparisons.judged([r["metrics"][m] for r in unculled], [r["metrics"][m] for r in culled]) for m in unculled[0]["metrics"]}}
 
 
 def table(report):

@@ -22,10 +22,10 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 MOTION = HERE.parent / "motion"
 SHARED = [MOTION / f for f in ("engine.in", "material.in", "sides.in", "box.in")]  # of motion's decks
-sys.path.insert(0, str(HERE.parent))
-from solidcull_runs import beds, engine, errors, few_steps, logs, metrics, tables, twins  # noqa: E402
+sys.path.insert(0, str(HERE.parents[1]))
+from solidcull_runs import beds, engine, errors, few_steps, logs, tables, twins  # noqa: E402
 from solidcull_runs.dumps import read_final, snapshots  # noqa: E402
-from solidcull_runs.metrics import check  # noqa: E402
+from solidcull_runs.comparisons import check  # noqa: E402
 
 GRAVITY, DENSITY, POISSON = 9.81, 2500, 0.3
 KINDS = {"live": "exterior live", "sleep": "exterior sleep"}  # of culled runs, and their keywords

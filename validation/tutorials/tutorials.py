@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(HERE.parents[1]))
 from solidcull_runs import engine, errors  # noqa: E402
 from solidcull_runs.decks import read_deck, words_of  # noqa: E402
 

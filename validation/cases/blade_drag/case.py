@@ -1,7 +1,7 @@
 """A blade is plunged into a bed and dragged; at three depths for the law."""
 import numpy as np
 
-from solidcull_runs import meshes, surfaces
+from solidcull_runs import measures, meshes
 
 deck, bed = "blade.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "low", "high", "pour", "damp", "free")
@@ -28,7 +28,7 @@ def measure(run, v):
     drag, lift, x, z = (run.series(c)[1] for c in ("f_mean[1]", "f_mean[2]", "f_blade[7]", "f_blade[9]"))
     far = x > x[0] + 0.4 * (x[-1] - x[0])
     cell, size = 0.002, (v["L"], v["W"])
-    change = surfaces.height_map(run.final, (0, 0), size, cell) - surfaces.height_map(run.start, (0, 0), size, cell)
+    change = measures.height_map(run.final, (0, 0), size, cell) - measures.height_map(run.start, (0, 0), size, cell)
     return {"drag": drag[far].mean(), "lift": lift[far].mean(), "plunge work": -(lift[1:] * np.diff(z)).sum(),
             "heap": change[change > 0].sum() * cell**2}
 

@@ -1,7 +1,7 @@
 """Columns of three aspect ratios collapse in a channel."""
 import numpy as np
 
-from solidcull_runs import meshes, surfaces
+from solidcull_runs import measures, meshes
 
 deck, bed = "collapse.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "room", "small", "large", "dt", "low", "high", "pour", "damp", "free")
@@ -26,7 +26,7 @@ def files(folder, v):
 
 def profile(granules, v):
     """Mean height over the width, at x in steps of CELL."""
-    return surfaces.height_map(granules, (0, 0), (v["L"] + v["room"], v["W"]), CELL).mean(axis=1)
+    return measures.height_map(granules, (0, 0), (v["L"] + v["room"], v["W"]), CELL).mean(axis=1)
 
 
 def measure(run, v):

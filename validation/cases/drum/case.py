@@ -1,5 +1,5 @@
 """A drum that turns so fast that nothing in it rests."""
-from solidcull_runs import meshes, moving
+from solidcull_runs import measures, meshes
 
 deck, bed = "drum.in", "bed.in"
 bed_uses = ("bed_granules", "radius", "length", "small", "large", "dt", "skin", "period", "fill")
@@ -15,5 +15,5 @@ def files(folder, v):
 
 
 def measure(run, v):
-    return {"torque": abs(moving.series(run, "v_torque").mean()), "kinetic energy": moving.kinetic_energy(run).mean(),
-            "centre, sideways": moving.centre(run, "x").mean(), "centre, height": moving.centre(run, "z").mean()}
+    return {"torque": abs(measures.series(run, "v_torque").mean()), "kinetic energy": measures.kinetic_energy(run).mean(),
+            "centre, sideways": measures.centre(run, "x").mean(), "centre, height": measures.centre(run, "z").mean()}

@@ -1,7 +1,7 @@
 """A heap is fed on its top."""
 import numpy as np
 
-from solidcull_runs import meshes, surfaces
+from solidcull_runs import measures, meshes
 
 deck, bed = "feed.in", "build.in"
 bed_uses = ("bed_granules", "L", "dt", "foot", "tall", "high", "sink")
@@ -22,7 +22,7 @@ def files(folder, v):
 def measure(run, v):
     """The profile is the mean height over rings a granule wide."""
     end, middle = run.final, v["L"] / 2
-    height = surfaces.height_map(end, (0, 0), (v["L"], v["L"]), CELL)
+    height = measures.height_map(end, (0, 0), (v["L"], v["L"]), CELL)
     at = (np.arange(len(height)) + 0.5) * CELL - middle
     ring = (np.hypot(*np.meshgrid(at, at, indexing="ij")) / D).astype(int)
     h = np.bincount(ring.ravel(), height.ravel()) / np.bincount(ring.ravel())

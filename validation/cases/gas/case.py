@@ -1,7 +1,7 @@
 """A gas of granules: nothing touches anything for long."""
 import numpy as np
 
-from solidcull_runs import moving
+from solidcull_runs import measures
 
 deck = "gas.in"
 of_both = {"small": 0.0024, "large": 0.0028, "dt": 5e-5, "skin": 0.002, "relax": 200}
@@ -11,7 +11,7 @@ aside = "aside"
 
 
 def measure(run, v):
-    energy = moving.kinetic_energy(run)
+    energy = measures.kinetic_energy(run)
     return {"kinetic energy": energy.mean(), "energy left at half time": energy[len(energy) // 2] / energy[0], "energy left": energy[-1] / energy[0],
             "centre, sideways": np.average(run.final["x"], weights=run.final["mass"])}
 

@@ -1,7 +1,7 @@
 """Gravity goes for a while and comes back: a bed springs up and falls back."""
 import numpy as np
 
-from solidcull_runs import meshes, moving
+from solidcull_runs import measures, meshes
 
 deck, bed = "switch.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "pour")
@@ -17,6 +17,6 @@ def files(folder, v):
 
 
 def measure(run, v):
-    floor, z = moving.series(run, "v_floor"), moving.centre(run, "z")
-    return {"peak kinetic energy": moving.kinetic_energy(run).max(), "rise of the centre": z.max() - z[0], "floor's peak load": floor.max(),
+    floor, z = measures.series(run, "v_floor"), measures.centre(run, "z")
+    return {"peak kinetic energy": measures.kinetic_energy(run).max(), "rise of the centre": z.max() - z[0], "floor's peak load": floor.max(),
             "floor's load at the end": floor[-len(floor) // 10:].mean(), "height of the centre": np.average(run.final["z"], weights=run.final["mass"])}

@@ -1,7 +1,7 @@
 """The strike of examples/impact."""
 import numpy as np
 
-from solidcull_runs import surfaces
+from solidcull_runs import measures
 
 deck, bed = "../../../examples/impact/impact.in", "../../../examples/impact/settle.in"
 bed_uses = ("bed_granules", "L")
@@ -16,7 +16,7 @@ CELL = 5e-4  # m, of the height map
 
 def measure(run, v):
     depth, force, energy, floor = (run.series(c)[1] for c in ("v_depth", "v_force", "c_bedke", "v_floor"))
-    after, before = (surfaces.height_map(g[g["radius"] < 0.005], (0, 0), (v["L"], v["L"]), CELL) for g in (run.final, run.start))
+    after, before = (measures.height_map(g[g["radius"] < 0.005], (0, 0), (v["L"], v["L"]), CELL) for g in (run.final, run.start))
     change = (after - before) * CELL**2
     way = np.sqrt(sum((run.final[c] - run.start[c])**2 for c in "xyz"))[run.final["radius"] < 0.005]
     return {"largest depth": depth.max(), "depth at the end": depth[-1], "peak force on the ball": force.max(),

@@ -1,7 +1,7 @@
 """A block is lowered into a bed, held, withdrawn."""
 import numpy as np
 
-from solidcull_runs import meshes, surfaces
+from solidcull_runs import measures, meshes
 
 deck, bed = "block.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "low", "high", "pour", "damp", "free")
@@ -24,6 +24,6 @@ def measure(run, v):
     force, z = (run.series(c)[1] for c in ("f_mean", "f_block[9]"))
     down, low = np.diff(z) < 0, np.flatnonzero(z < z.min() + 1e-9)
     cell, size = 0.002, (v["L"], v["W"])
-    change = surfaces.height_map(run.final, (0, 0), size, cell) - surfaces.height_map(run.start, (0, 0), size, cell)
+    change = measures.height_map(run.final, (0, 0), size, cell) - measures.height_map(run.start, (0, 0), size, cell)
     return {"largest force": force[1:][down].max(), "work": -(force[1:] * np.diff(z))[down].sum(),
             "force on hold": force[low[len(low) // 2:]].mean(), "hollow": -change[change < 0].sum() * cell**2}

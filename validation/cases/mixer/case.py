@@ -1,7 +1,7 @@
 """A mixer whose four blades leave nothing at rest."""
 import numpy as np
 
-from solidcull_runs import meshes, moving
+from solidcull_runs import measures, meshes
 
 deck, bed = "mixer.in", "bed.in"
 bed_uses = ("bed_granules", "radius", "blade", "blade_high", "high", "small", "large", "dt", "skin", "period", "fill")
@@ -19,5 +19,5 @@ def files(folder, v):
 
 def measure(run, v):
     far = np.hypot(run.final["x"], run.final["y"])
-    return {"torque": abs(moving.series(run, "v_torque").mean()), "kinetic energy": moving.kinetic_energy(run).mean(),
+    return {"torque": abs(measures.series(run, "v_torque").mean()), "kinetic energy": measures.kinetic_energy(run).mean(),
             "height of the centre": np.average(run.final["z"], weights=run.final["mass"]), "distance from the axis": np.average(far, weights=run.final["mass"])}

@@ -1,7 +1,7 @@
 """A plate presses slowly on a culled bed; it taps the bed for the pulse."""
 import numpy as np
 
-from solidcull_runs import meshes, moving
+from solidcull_runs import measures, meshes
 
 deck, bed = "press.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "pour")
@@ -36,8 +36,8 @@ def files(folder, v):
 
 
 def measure(run, v):
-    t = moving.time(run)
-    force, *p = moving.series(run, "v_force", "v_p0", "v_p1", "v_p2", "v_p3")
+    t = measures.time(run)
+    force, *p = measures.series(run, "v_force", "v_p0", "v_p1", "v_p2", "v_p3")
     resting = t < (v["rest"] + 0.5) * v["dt"]
     rise = np.array([x - x[resting].mean() for x in p])
     centre, total, began = rise[0], rise.sum(axis=0), t[resting][-1]

@@ -1,5 +1,5 @@
 """A side wall moves out of a bed at rest."""
-from solidcull_runs import meshes, surfaces
+from solidcull_runs import measures, meshes
 
 deck, bed, bed_uses = "wall.in", "../../shared/pour.in", ("bed_granules", "L", "W", "around")
 quick = {"granules": 6000, "bed_granules": 6000, "L": 0.06, "W": 0.03, "around": 0.02, "steps": 2200, "speed": 0.055}
@@ -14,6 +14,6 @@ def files(folder, v):
 
 def measure(run, v):
     push = run.series("v_push")[1]
-    surface = [surfaces.height_map(g, (0, 0), (v["L"], v["W"]), 5e-4) for g in (run.start, run.final)]
+    surface = [measures.height_map(g, (0, 0), (v["L"], v["W"]), 5e-4) for g in (run.start, run.final)]
     return {"push at rest": push[5:20].mean(), "active push": push[-len(push) // 4:].mean(),
             "sunken volume": (surface[0] - surface[1]).clip(0).sum() * 25e-8}

@@ -1,7 +1,7 @@
 """A wheel rolls over a bed at a given sinkage and slip; with less slip for the law."""
 import numpy as np
 
-from solidcull_runs import meshes, surfaces
+from solidcull_runs import measures, meshes
 
 deck, bed = "wheel.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "low", "high", "pour", "damp", "free")
@@ -29,7 +29,7 @@ def measure(run, v):
     far = x > x[0] + 0.4 * path
     cell, y = 0.002, (v["W"] - v["wide"]) / 2
     low, size = (v["start"] + 0.2 * path, y), (0.5 * path, v["wide"])
-    before, after = (surfaces.height_map(g, low, size, cell) for g in (run.start, run.final))
+    before, after = (measures.height_map(g, low, size, cell) for g in (run.start, run.final))
     return {"pull over load": pull[far].mean() / load[far].mean(), "load": load[far].mean(), "torque": torque[far].mean(),
             "rut": (before - after).mean()}
 

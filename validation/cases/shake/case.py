@@ -1,7 +1,7 @@
 """A bed on a floor that shakes it, below and above 1 g."""
 import numpy as np
 
-from solidcull_runs import meshes, moving
+from solidcull_runs import measures, meshes
 
 deck, bed = "shake.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "pour")
@@ -18,8 +18,8 @@ def files(folder, v):
 
 
 def measure(run, v):
-    t, floor = moving.time(run), moving.series(run, "v_floor")
-    energy = moving.kinetic_energy(run)
+    t, floor = measures.time(run), measures.series(run, "v_floor")
+    energy = measures.kinetic_energy(run)
     shaken = (t >= v["rest"] * v["dt"]) & (t <= t[-1] - v["after"] * v["dt"])
     late = t >= t[-1] - v["after"] * v["dt"] / 2
     return {"peak kinetic energy": energy.max(), "mean kinetic energy": energy[shaken].mean(), "floor's peak load": floor.max(),

@@ -3,7 +3,7 @@ import math
 
 import numpy as np
 
-from solidcull_runs import meshes, moving
+from solidcull_runs import measures, meshes
 
 deck, bed = "discharge.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "low", "high", "pour")
@@ -26,8 +26,8 @@ def files(folder, v):
 
 
 def measure(run, v):
-    t = moving.time(run)
-    out, floor, right, whole = moving.series(run, "v_out", "v_floor", "v_right", "v_whole")
+    t = measures.time(run)
+    out, floor, right, whole = measures.series(run, "v_out", "v_floor", "v_right", "v_whole")
     resting = t < (v["rest"] + 0.5) * v["dt"]
     late = t >= t[resting][-1] + (t[-1] - t[resting][-1]) / 3
     way = np.sqrt(sum((run.final[c] - run.start[c])**2 for c in "xyz"))

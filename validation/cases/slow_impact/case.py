@@ -3,7 +3,7 @@ import math
 
 import numpy as np
 
-from solidcull_runs import meshes, surfaces
+from solidcull_runs import measures, meshes
 
 deck, bed, bed_uses = "impact.in", "../../shared/pour.in", ("bed_granules", "L", "W")
 quick = {"granules": 6001, "bed_granules": 6000, "L": 0.05, "W": 0.05, "steps": 2800}
@@ -24,7 +24,7 @@ def measure(run, v):
     stopped = np.argmax(depth >= 0.95 * depth.max())
     bed, start = (g[g["radius"] < 0.004] for g in (run.final, run.start))
     cell, size = 5e-4, (v["L"], v["W"])
-    change = surfaces.height_map(bed, (0, 0), size, cell) - surfaces.height_map(start, (0, 0), size, cell)
+    change = measures.height_map(bed, (0, 0), size, cell) - measures.height_map(start, (0, 0), size, cell)
     return {"depth": depth.max(), "stopping time": t[stopped] - t[0], "peak force on the ball": force.max(),
             "peak rise of the floor's load": floor.max() - floor[0], "crater": -change[change < 0].sum() * cell**2}
 

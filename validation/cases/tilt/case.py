@@ -1,7 +1,7 @@
 """A leaning bed leans further and avalanches."""
 import numpy as np
 
-from solidcull_runs import moving
+from solidcull_runs import measures
 
 deck, bed = "tilt.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "pour", "lean")
@@ -13,7 +13,7 @@ D = 0.0052  # m: mean diameter
 
 
 def measure(run, v):
-    angle, x, energy = moving.series(run, "v_angle"), moving.centre(run, "x"), moving.kinetic_energy(run)
+    angle, x, energy = measures.series(run, "v_angle"), measures.centre(run, "x"), measures.kinetic_energy(run)
     gone = x - x[0] > 0.05 * D
     return {"angle": angle[np.argmax(gone)] if gone.any() else angle[-1], "way of the centre": x[-1] - x[0], "peak kinetic energy": energy.max(),
             "height of the centre": np.average(run.final["z"], weights=run.final["mass"])}

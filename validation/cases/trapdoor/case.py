@@ -1,7 +1,7 @@
 """A door in the floor sinks a little, then opens."""
 import numpy as np
 
-from solidcull_runs import meshes, moving, surfaces
+from solidcull_runs import measures, meshes
 
 deck, bed = "door.in", "../../shared/pour.in"
 bed_uses = ("bed_granules", "L", "W", "small", "large", "dt", "low", "high", "pour")
@@ -27,7 +27,7 @@ def files(folder, v):
 def slope(granules, v, side):
     """Angle of the surface (deg) between the door's edge and twice the door's width from there."""
     cell = D / 2
-    height = surfaces.height_map(granules[granules["z"] > 0], (0, 0), (v["L"], v["W"]), cell).max(axis=1)
+    height = measures.height_map(granules[granules["z"] > 0], (0, 0), (v["L"], v["W"]), cell).max(axis=1)
     x = (np.arange(len(height)) + 0.5) * cell
     away = side * (x - v["L"] / 2) - v["wide"] / 2
     there = (away > D) & (away < v["wide"])
@@ -35,8 +35,8 @@ def slope(granules, v, side):
 
 
 def measure(run, v):
-    t = moving.time(run)
-    door, out = moving.series(run, "v_door", "v_out")
+    t = measures.time(run)
+    door, out = measures.series(run, "v_door", "v_out")
     end_of_rest, end_of_hold = (v["rest"] + 0.5) * v["dt"], (v["rest"] + v["sinking"] + v["hold"] + 0.5) * v["dt"]
     held = (t <= end_of_hold) & (t >= end_of_hold - v["hold"] / 2 * v["dt"])
     return {"door's load at rest": door[t <= end_of_rest].mean(), "door's least load": door[t <= end_of_hold].min(), "door's load, sunk": door[held].mean() if held.any() else np.nan,

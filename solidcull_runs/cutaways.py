@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-# the paper's colours, by the value of the point array `state`
-STATES = {0: ("exterior", (0.85, 0.73, 0.55)), 1: ("interface", (0.25, 0.45, 0.80)), 2: ("interior", (0.33, 0.62, 0.33)),
-          3: ("waking", (0.95, 0.55, 0.10))}
+from . import plots
+from .plots import STATES
+
 MESH = (0.72, 0.72, 0.72)
 STRIKER = (0.30, 0.30, 0.33)
 LIGHT = np.array([-0.35, -0.6, 0.72])  # towards the light, in (right, to the eye negative, up) of the picture
@@ -143,8 +143,6 @@ def legend(figure, mesh=True):
 def film_strip(moments, file):
     """Writes one picture: a column for each of `moments` (title, granules image, mesh image)."""
     from PIL import Image
-
-    from . import plots
     figure, axes = plots.plt.subplots(2, len(moments), squeeze=False, figsize=(3.2 * len(moments), 5.4))
     for (top, bottom), (title, granules, mesh) in zip(axes.T, moments):
         top.imshow(granules)

@@ -1,7 +1,9 @@
-"""The surface of a bed, from the places of its granules."""
+"""What is measured of a run: the surface of its bed, from the places of the granules; sums over all granules, from thermo columns."""
 import itertools
 
 import numpy as np
+
+STORED = {"x": "f_cull[20]", "y": "f_cull[21]", "z": "f_cull[22]"}
 
 
 def height_map(granules, low, size, cell, ground=0.0):
@@ -32,3 +34,31 @@ def outside(granules, size, floor=0.0):
     """Granules whose centre is behind a wall: x from 0 to size[0], y from 0 to size[1], z above the floor."""
     x, y, z = granules["x"], granules["y"], granules["z"]
     return int(((x < 0) | (x > size[0]) | (y < 0) | (y > size[1]) | (z < floor)).sum())
+
+
+# --- from thermo columns: what LIGGGHTS sees, and what the fix says of the granules in its store ---
+
+def series(run, *names):
+    """Columns without their first row: where a run was before, LIGGGHTS counts the loads on meshes twice there."""
+    found = [run.series(name)[1][1:] for name in names]
+    return found[0] if len(found) == 1 else found
+
+
+def time(run):
+    """Time since the fix line (s), without the first row too."""
+    t = run.series("time")[1]
+    return t[1:] - t[0]
+
+
+def kinetic_energy(run):
+    """Of all granules (J), of the columns c_ke and f_cull[19]."""
+    return series(run, "c_ke") + (series(run, "f_cull[19]") if run.counts else 0)
+
+
+def centre(run, axis):
+    """A coordinate of the centre of mass of all granules (m), of the columns v_mass, v_AXIS, f_cull[5] and f_cull[20..22]."""
+    at = series(run, f"v_{axis}")
+    if not run.counts:
+        return at
+    mass, stored = series(run, "v_mass", "f_cull[5]")
+    return (mass * at + stored * series(run, STORED[axis])) / (mass + stored)

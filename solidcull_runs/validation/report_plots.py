@@ -1,9 +1,8 @@
-"""Figures of the validation report."""
+"""Plots of the validation report: metrics against time, run time against error, error against tolerance."""
 import numpy as np
 
-from . import dumps, judgement
-from .pictures import STATES
-from .plots import plt, save
+from ..plots import plt, save
+from . import verdicts
 from .points import ALSO, BY_HAND, FAMILIES, LIVE, PAPER, SLEEP, UNCULLED
 
 COLOURS = {UNCULLED: "0.35", SLEEP: "tab:blue", LIVE: "tab:orange", PAPER: "tab:red", BY_HAND: "tab:green", ALSO: "tab:purple"}
@@ -22,8 +21,8 @@ def grid(n, width=3.6, height=2.6, columns=3):
 
 def curves(result, file):
     """Each metric that has a curve against time: culled over the band of the unculled runs. False where there is none."""
-    scene = judgement.main_scene(result)
-    unculled = judgement.unculled_of(scene)
+    scene = verdicts.main_scene(result)
+    unculled = verdicts.unculled_of(scene)
     names = list(next((r["curves"] for r in (unculled or {"runs": []})["runs"] if r.get("curves")), {}))
     if not names:
         return False
@@ -50,9 +49,9 @@ def shown(error):
     return max(error, LEAST)
 
 
-def cost_against_error(ax, result, judged, labels=True):
+def cost_against_error(ax, result, judged):
     """Time over that of the unculled runs against the largest error, in margins."""
-    noise = judgement.noise_of(result)
+    noise = verdicts.noise_of(result)
     for family in FAMILIES:
         points = sorted((j for j in judged.values() if j.family == family and not j.share), key=lambda j: j.absolute or 0)
         if points:
@@ -60,12 +59,10 @@ def cost_against_error(ax, result, judged, labels=True):
                     color=COLOURS[family], ms=6, lw=0.8, label=family)
         relative = [j for j in judged.values() if j.family == family and j.share]
         ax.plot([j.of_unculled for j in relative], [shown(j.error) for j in relative], MARKS[family], color=COLOURS[family], mfc="none", ms=6)
-        if labels:
-            for j in [*points, *relative]:
-                if j.absolute or family == ALSO:
-                    name = j.name if family == ALSO else f"{j.absolute:g}" + f" {j.share:g}" * bool(j.share)
-                    ax.annotate(name, (j.of_unculled, shown(j.error)), fontsize=6,
-                                xytext=(3, 3), textcoords="offset points")
+        for j in [*points, *relative]:
+            if j.absolute or family == ALSO:
+                name = j.name if family == ALSO else f"{j.absolute:g}" + f" {j.share:g}" * bool(j.share)
+                ax.annotate(name, (j.of_unculled, shown(j.error)), fontsize=6, xytext=(3, 3), textcoords="offset points")
     ax.plot([1], [shown(noise)], MARKS[UNCULLED], color=COLOURS[UNCULLED], label=UNCULLED)
     ax.axhspan(LEAST / 2, shown(noise), color="0.9", lw=0)
     ax.axhline(1, color="0.5", lw=0.8, ls=":")
@@ -87,7 +84,7 @@ def case_plots(result, judged, file):
         for k, name in enumerate(names):
             right.plot([j.absolute for j in points], [shown(j.verdicts[name].in_margins) for j in points], "o-" if family == SLEEP else "^--",
                        color=f"C{k}", ms=4, lw=0.8, label=f"{name}" if family == SLEEP else None)
-    right.axhline(shown(judgement.noise_of(result)), color="0.5", lw=0.8)
+    right.axhline(shown(verdicts.noise_of(result)), color="0.5", lw=0.8)
     right.axhline(1, color="0.5", lw=0.8, ls=":")
     right.set(xscale="log", yscale="log", xlabel="tolerance (m g)", ylabel="error (margins)", ylim=(LEAST / 2, None))
     right.legend(fontsize=6)
@@ -100,9 +97,9 @@ def shares(ax):
     ax.set_xticks([], minor=True)
 
 
-def without_overlap(ax, labels, height=9, width=5.2):
-    """Names beside their points (x, y, text), moved down where they would lie on one another. `height`, `width`: of a line and of a
-    letter, in points."""
+def without_overlap(ax, labels):
+    """Names beside their points (x, y, text), moved down where they would lie on one another."""
+    height, width = 9, 5.2  # of a line and of a letter, in points
     to_points = ax.transData.transform
     scale = 72 / ax.figure.dpi
     placed = []
@@ -123,12 +120,12 @@ def all_cases(results, file):
     figure, ax = plt.subplots(figsize=(9, 6))
     labels = []
     for result in results:
-        judged = judgement.judge(result)
+        judged = verdicts.judge(result)
         for j in judged.values():
             ax.plot(j.of_unculled, shown(j.error), MARKS[j.family], color=COLOURS[j.family], ms=8 if j.default else 3.5, alpha=1 if j.default else 0.4)
             if j.default and j.family == SLEEP:
                 labels.append((j.of_unculled, shown(j.error), result["case"].replace("_", " ")))
-    seen = {j.family for result in results for j in judgement.judge(result).values()}
+    seen = {j.family for result in results for j in verdicts.judge(result).values()}
     for family in FAMILIES:
         if family in seen:
             ax.plot([], [], MARKS[family], color=COLOURS[family], label=family)
@@ -140,88 +137,3 @@ def all_cases(results, file):
     without_overlap(ax, labels)
     ax.legend(fontsize=8, loc="lower left")
     save(figure, file)
-
-
-# ------------------------------------------------------------------------------------------------------------ what moves
-
-def busiest(file, diameter, steps):
-    """Of the snapshots of an unculled run at these steps: the one with the most motion since the one before, its rows, and how far
-    each granule had moved (mean diameters)."""
-    best, before = None, None
-    for step, columns, rows in dumps.snapshots(file):
-        rows = rows[np.argsort(rows[:, 0])]
-        if before is not None and len(before) == len(rows):
-            way = np.linalg.norm(rows[:, 1:4] - before[:, 1:4], axis=1) / diameter
-            count = int((way > 1e-2).sum())
-            if step in steps and (best is None or count > best[0]):
-                best = count, step, rows, way
-        before = rows
-    return best and best[1:]
-
-
-def when_culled(file):
-    """The snapshots of a culled run in which something is stored, by step; all where nothing ever is."""
-    rows_of = {step: rows for step, _, rows in dumps.snapshots(file)}
-    most = max(map(len, rows_of.values()))
-    return {step: rows for step, rows in rows_of.items() if len(rows) < most} or rows_of
-
-
-def last_seen(file, step, ids):
-    """Where the granules were that are no atoms at the step: their last row up to it."""
-    rows_of = {}
-    for s, _, rows in dumps.snapshots(file):
-        if s > step:
-            break
-        for row in rows[np.isin(rows[:, 0], ids)]:
-            rows_of[int(row[0])] = row
-    return np.array([rows_of[i] for i in ids if i in rows_of])
-
-
-def discs(ax, rows, colours, axes):
-    from matplotlib.collections import EllipseCollection
-    sizes = 2 * rows[:, 4]
-    ax.add_collection(EllipseCollection(sizes, sizes, np.zeros(len(rows)), units="xy", offsets=rows[:, [1 + axes[0], 1 + axes[1]]],
-                                        transOffset=ax.transData, facecolors=colours, edgecolors="0.3", linewidths=0.15))
-
-
-def what_moves(unculled, culled, file, diameter, cut=(1, 0.5), largest=np.inf):
-    """A slice of the bed when it moves most: how far granules moved in the unculled run, and what the culled run holds as what.
-    `unculled`, `culled`: files of snapshots; `cut`: axis and share of the box; `largest`: radii above are drawn dark. False without
-    snapshots."""
-    if not (unculled.exists() and culled.exists()):
-        return False
-    stored = when_culled(culled)
-    found = busiest(unculled, diameter, stored)
-    if not found:
-        return False
-    step, rows, way = found
-    axis, share = cut
-    axes = [a for a in range(3) if a != axis]
-    place = rows[:, 1 + axis]
-    low, high = np.percentile(place, [1, 99])
-    middle = low + share * (high - low)
-    figure, panels = plt.subplots(1, 2, figsize=(10, 4.2))
-    near = np.abs(place - middle) < np.maximum(0.75 * diameter, rows[:, 4])
-    near = np.flatnonzero(near)[np.argsort(-np.abs(place[near] - middle))]
-    shade = plt.get_cmap("viridis")(np.clip((np.log10(np.maximum(way, 1e-4)) + 4) / 4, 0, 1))
-    shade[rows[:, 4] > largest] = (0.3, 0.3, 0.33, 1)
-    discs(panels[0], rows[near], shade[near], axes)
-    panels[0].set_title("unculled: way since the last snapshot, 1e-4 d (dark) to d (bright)", fontsize=8)
-    then = stored[step]
-    away = last_seen(culled, step, np.setdiff1d(rows[:, 0], then[:, 0]))
-    state = np.concatenate([np.where(then[:, 5] > 0, 1, 0), np.full(len(away), 2)])
-    both = np.vstack([then[:, :5], away[:, :5]]) if len(away) else then[:, :5]
-    distance = np.abs(both[:, 1 + axis] - middle)
-    near = np.flatnonzero(distance < np.maximum(0.75 * diameter, both[:, 4]))
-    near = near[np.argsort(-distance[near])]
-    shade = np.array([STATES[s][1] for s in state])
-    shade[both[:, 4] > largest] = (0.3, 0.3, 0.33)
-    discs(panels[1], both[near], shade[near], axes)
-    panels[1].set_title("sleep: exterior tan, interface blue, interior green", fontsize=8)
-    for ax in panels:
-        ax.set(aspect="equal", xlim=np.percentile(rows[:, 1 + axes[0]], [0, 100]) + np.array([-1, 1]) * diameter,
-               ylim=np.percentile(rows[:, 1 + axes[1]], [0, 100]) + np.array([-1, 1]) * diameter)
-        ax.tick_params(labelsize=6)
-    figure.suptitle(f"step {step:,}", fontsize=9)
-    save(figure, file, dpi=110)
-    return True

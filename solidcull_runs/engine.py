@@ -11,7 +11,7 @@ from pathlib import Path
 
 from .errors import RunError
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 NAMED_BY = "SOLIDCULL_LAUNCHER"  # variable of the environment: another launcher than that of build/
 POLL = 0.02                      # s between two looks at a process
 COUNTED = ("instructions", "cycles")

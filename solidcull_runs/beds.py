@@ -1,9 +1,11 @@
-"""What is made once and kept as long as it is made of the same: beds, and files that scripts write."""
+"""Beds, their restart files, and other files: made once, and kept as long as they are made of the same."""
 import json
 import os
 from pathlib import Path
 
 from .engine import run_liggghts
+
+ENDS, END_WORDS = b"SDCULLE1", 8  # the end of a section of culled granules, see culling/store_section.h
 
 
 def made(file, recipe, make, say=lambda line: print(line, flush=True)):
@@ -37,7 +39,9 @@ def settled(file, deck, sources=(), variables=None, writes="restart", more="", *
     return made(file, recipe, make, **how)
 
 
-def write_if_new(file, text):
-    """Writes a file unless it holds the text, so that what is made of it is not older."""
-    if not file.exists() or file.read_text() != text:
-        file.write_text(text)
+def holds_culled(file):
+    """Whether culled granules stand at the end of a restart file; False where it cannot be read."""
+    try:
+        return ENDS in Path(file).read_bytes()[-8 * END_WORDS:][:len(ENDS)]
+    except OSError:
+        return False

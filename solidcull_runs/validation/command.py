@@ -9,13 +9,14 @@ import json
 import sys
 from pathlib import Path
 
-from . import cases, engine, ensembles, errors, few, figures, publish, report
-from .dumps import read_final
-from .errors import RunError
+from .. import engine, errors
+from ..dumps import read_final
+from ..errors import RunError
+from ..twins import cores
+from . import case_results, case_runs, cases, report, short_cases, slices
 from .points import SLEEP, UNCULLED
-from .twins import cores
 
-HERE = Path(__file__).resolve().parents[1]
+HERE = engine.ROOT / "validation"
 
 
 def options(argv):
@@ -47,10 +48,10 @@ def say(line):
 
 def run_case(case, jobs, course, out):
     """Runs it and leaves its results; the lines of what failed."""
-    done = ensembles.run_all(jobs, course)
-    result = ensembles.result_of(case, done)
+    done = case_runs.run_all(jobs, course)
+    result = case_results.result_of(case, done)
     draw(case, done, out / case.name / "what_moves.png")
-    file = ensembles.results_file(out, case)
+    file = case_results.results_file(out, case)
     part = file.with_suffix(".part")
     part.write_text(json.dumps(result) + "\n")
     part.rename(file)
@@ -65,7 +66,7 @@ def draw(case, done, file):
     final = read_final(framed[UNCULLED].file(".final"))
     diameter = 2 * float(sorted(final["radius"])[len(final) // 2])
     axis, share, largest = case.get("picture", ("y", 0.5, float("inf")))
-    figures.what_moves(framed[UNCULLED].file(".frames"), framed[SLEEP].file(".frames"), file, diameter, ("xyz".index(axis), share), largest)
+    slices.what_moves(framed[UNCULLED].file(".frames"), framed[SLEEP].file(".frames"), file, diameter, ("xyz".index(axis), share), largest)
 
 
 def run(a):
@@ -74,19 +75,19 @@ def run(a):
     failed = []
     if a.few_steps:
         for case in wanted:
-            failed += few.faults_of(case, a.out / "few", engine.find_launcher(), say)
+            failed += short_cases.faults_of(case, a.out / "few", engine.find_launcher(), say)
         return told(failed)
     if not a.report_only:
         launcher = engine.find_launcher()
         fix = engine.hash_of_fix(launcher)
-        beds = ensembles.make_beds(wanted, out, a.at_once, say)
+        beds = case_runs.make_beds(wanted, out, a.at_once, say)
         jobs = {}
         for case in wanted:
             try:
-                jobs[case] = ensembles.jobs_of(case, out, beds, launcher, fix, a.also)
+                jobs[case] = case_runs.jobs_of(case, out, beds, launcher, fix, a.also)
             except RunError as e:
                 failed.append(str(e))
-        course = ensembles.Course([job for of_case in jobs.values() for job in of_case], a.at_once, say)
+        course = case_runs.Course([job for of_case in jobs.values() for job in of_case], a.at_once, say)
         for case, of_case in jobs.items():
             try:
                 failed += run_case(case, of_case, course, out)
@@ -95,9 +96,9 @@ def run(a):
                 say(f"{case.name}: {e}")
     results = []
     for case in wanted if a.case else cases.load([], a.size):
-        file = ensembles.results_file(out, case)
+        file = case_results.results_file(out, case)
         if file.exists():
-            results.append(report.read_result(file))
+            results.append(case_results.read_result(file))
         elif a.report_only:
             say(f"{case.name} has no results; run it first")
     folder = a.report or HERE / "report" / a.size
@@ -105,7 +106,7 @@ def run(a):
     page = report.write(results, folder, out, f"Made by `validation/run.sh --{a.size}`.")
     say(f"report: {folder / 'README.md'} and {folder / 'report.html'}")
     if a.publish:
-        publish.publish(results, page, folder, HERE.parent)
+        report.publish(results, page, folder, HERE.parent)
     return told(failed) or int(any(r["lost"] for r in results))
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from . import decks, dumps, logs, metrics, restarts, shifts
+from . import comparisons, decks, dumps, logs, shifts
+from .beds import holds_culled
 from .engine import POLL, Process, find_launcher
 from .errors import RunError
 
@@ -77,7 +78,7 @@ class Job:
         lines = decks.read_deck(self.deck)
         fix = decks.cull_fix(lines, self.deck.name)
         restart = decks.restart_of(lines, fix, self.variables)
-        restored = restart is not None and restarts.holds_culled(self.deck.parent / restart)
+        restored = restart is not None and holds_culled(self.deck.parent / restart)
         shift = shifts.Shift(self.seed, lines) if self.shifted else None
         made = "\n".join(decks.make_deck(lines, fix, self.kind != "unculled", shift, self.base, restored)) + "\n"
         return decks.with_keywords(made, self.keywords) if self.keywords and self.kind != "unculled" else made
@@ -205,7 +206,7 @@ def cores():
     return len(os.sched_getaffinity(0))
 
 
-def compare(deck, wanted=(), launcher=None, out=None, unculled=3, culled=1, vary=None, variables=None, ranks=1, margin=metrics.MARGIN,
+def compare(deck, wanted=(), launcher=None, out=None, unculled=3, culled=1, vary=None, variables=None, ranks=1, margin=comparisons.MARGIN,
             extra=None, at_once=1, steps=None, least_margins=None, granules=None, keywords=None, also=(),
             say=lambda line: None):
     """Runs the deck unculled and culled in turns; returns (result, runs by kind). `wanted`: thermo metrics. `vary`: (variable, values),
@@ -227,4 +228,4 @@ def compare(deck, wanted=(), launcher=None, out=None, unculled=3, culled=1, vary
             for kind, k in in_turns(unculled, culled)]
     done = run_jobs([*jobs, *also], at_once, say, steps)
     runs = {kind: [run for job, run in zip(jobs, done) if job.kind == kind] for kind in KINDS}
-    return metrics.judge(runs["unculled"], runs["culled"], margin, least_margins, granules), runs
+    return comparisons.judge(runs["unculled"], runs["culled"], margin, least_margins, granules), runs

@@ -5,10 +5,10 @@ import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from . import few_steps, pictures, tables
+from . import cutaways, few_steps, tables
 from .beds import settled
+from .comparisons import is_lost
 from .engine import ROOT
-from .metrics import is_lost
 from .twins import Job, compare, cores
 
 
@@ -74,32 +74,32 @@ def load(name):
 
 def draw(example, out, runs):
     """Cut-away pictures; False when the fix has left no files to draw."""
-    steps = pictures.steps_of(out / "bed.*.vtp")
+    steps = cutaways.steps_of(out / "bed.*.vtp")
     moments = list(example.moments(out, steps, runs)) if steps else []
     if not moments or any(moment[1] is None for moment in moments):
         return False
-    pictures.film_strip(moments, out / "cut-away.png")
+    cutaways.film_strip(moments, out / "cut-away.png")
     return True
 
 
-def options(example, argv):
+def options(example):
     p = argparse.ArgumentParser(prog=f"{example.name}/example.py")
     p.add_argument("--unculled", type=int, default=example.runs, metavar="N", help=f"unculled runs (default {example.runs})")
     p.add_argument("--culled", type=int, default=example.runs, metavar="N", help=f"culled runs (default {example.runs})")
     p.add_argument("--at-once", type=int, default=min(example.at_once, cores()), metavar="N",
                    help=f"runs at the same time (default {example.at_once}, at most one a core)")
     p.add_argument("--few-steps", action="store_true", help="few granules, few steps, one run of each kind: that all of it still runs")
-    a = p.parse_args(argv)
+    a = p.parse_args()
     most = len(example.vary[1]) if example.vary else 10
     if not (1 <= a.unculled <= most and 1 <= a.culled <= most and a.at_once >= 1):
         p.error(f"--unculled and --culled take 1 to {most}, --at-once 1 or more")
     return a
 
 
-def main(example, argv=None):
+def main(example):
     """Exit status: 0 it ran and no granule is lost, whatever figures are outside their margins (the table names them); 1 a granule is
     lost, or the fix wrote nothing to draw."""
-    a = options(example, argv)
+    a = options(example)
     out = example.folder(a.few_steps)
     out.mkdir(parents=True, exist_ok=True)
     if example.prepare:

@@ -1,5 +1,5 @@
-"""Results as text."""
-from .metrics import outside
+"""Comparisons as text."""
+from .comparisons import outside
 
 
 def percent(part, whole):

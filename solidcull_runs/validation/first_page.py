@@ -1,17 +1,16 @@
-"""What README.md shows of results: five rows and a plot, made of results files alone (see kept.py).
+"""What README.md shows of results: five rows and a plot, made of results files alone (see kept_figures.py).
 
-    cd validation; python3 -m solidcull_runs.first_page      # makes both anew
+    python3 -m solidcull_runs.validation.first_page      # in the folder of the project: makes both anew
 """
 import hashlib
 import json
-from pathlib import Path
 
-from . import kept
-from .errors import RunError, command
+from ..engine import ROOT
+from ..errors import RunError, command
+from ..plots import plt
+from . import kept_figures, pages
 from .points import SLEEP
-from .report import Page
 
-ROOT = Path(__file__).resolve().parents[2]
 CASES, SCALE, PLOT = "validation/results.json", "validation/scale/results.json", "validation/scale/times.png"
 BEGIN = f"<!-- made of {CASES} and {SCALE} -->"
 STRUCK = 1280000  # granules of the bed that the row of the strike is of
@@ -94,9 +93,9 @@ def rows(cases, scale):
 
 def readme(root, cases, scale):
     """The text of README.md with the rows of these records."""
-    page = Page()
+    page = pages.Page()
     page.table(HEAD, rows(cases, scale))
-    return kept.between_marks(root / "README.md", BEGIN, page.markdown())
+    return pages.between_marks(root / "README.md", BEGIN, page.markdown())
 
 
 def drawn(scale):
@@ -112,7 +111,6 @@ def mark_of(scale):
 
 def draw(scale, file):
     """Run time against the number of granules, with and without the line. The figure, closed."""
-    from .plots import plt
     strikes, asleep = drawn(scale)
     sizes = [r["granules"] for r in strikes]
     figure, ax = plt.subplots(figsize=(8.4, 4.6))
@@ -155,11 +153,11 @@ def write(root, cases, scale):
     """Writes the README's rows and the plot."""
     text = readme(root, cases, scale)
     draw(scale, root / PLOT)
-    kept.write(root / "README.md", text)
+    pages.write(root / "README.md", text)
 
 
 def main():
-    write(ROOT, kept.read(ROOT / CASES), kept.read(ROOT / SCALE))
+    write(ROOT, kept_figures.read(ROOT / CASES), kept_figures.read(ROOT / SCALE))
     return 0
 
 

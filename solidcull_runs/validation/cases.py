@@ -1,4 +1,4 @@
-"""A validation case is a folder of `cases/`: README.md (claim, reference, metrics and their margins), a deck, and case.py.
+"""A validation case is a folder of `validation/cases/`: README.md (claim, reference, metrics and their margins), a deck, and case.py.
 
 case.py holds, as plain names:
 
@@ -27,11 +27,10 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from .errors import RunError
+from ..engine import ROOT
+from ..errors import RunError
 
-ROOT = Path(__file__).resolve().parents[1]
-CASES = ROOT / "cases"
-SIZES = ("quick", "full")
+CASES = ROOT / "validation" / "cases"
 
 
 @dataclass(frozen=True)

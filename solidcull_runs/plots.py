@@ -1,11 +1,12 @@
 """Curves of unculled and culled runs."""
 import matplotlib
 
-from .pictures import STATES
-
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
+# the paper's colours, by the value of the point array `state`
+STATES = {0: ("exterior", (0.85, 0.73, 0.55)), 1: ("interface", (0.25, 0.45, 0.80)), 2: ("interior", (0.33, 0.62, 0.33)),
+          3: ("waking", (0.95, 0.55, 0.10))}
 STYLES = (("unculled", "0.75", 4), ("culled", "tab:blue", 1.3))  # kind, colour, width of the line
 
 

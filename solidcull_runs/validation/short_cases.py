@@ -3,9 +3,10 @@ import re
 
 import numpy as np
 
-from .engine import run_liggghts
-from .ensembles import CaseJob, Course, files_of, run_all, short_hash
-from .errors import RunError
+from ..engine import run_liggghts
+from ..errors import RunError
+from .case_runs import CaseJob, Course, files_of, run_all
+from .cases import short_hash
 from .points import UNCULLED, Point
 
 STEPS, BED_STEPS = 40, 200

@@ -1,0 +1,41 @@
+"""What the scripts of `examples/`, `validation/`, `benchmarks/` and `tests/` share: a deck is run with and without its `solid/cull`
+line and compared.
+
+| module | what it is for |
+| --- | --- |
+| `errors` | what the user has to mend, in one line; the exit status of a script |
+| `engine` | LIGGGHTS: finding it, running it |
+| `decks` | one deck made culled and unculled |
+| `shifts` | lines of a deck that move its granules a little, from run to run |
+| `logs` | what a run printed |
+| `dumps` | the files that a run left |
+| `beds` | beds and other files that are made once and kept |
+| `meshes` | triangles, and STL files of them |
+| `measures` | what is measured of a run: heights of the bed, sums over all granules |
+| `twins` | runs of both kinds, one after the other or several at once, and their comparison |
+| `comparisons` | errors beside the noise floor, and the ledger |
+| `few_steps` | what can be checked of a run after a few steps |
+| `tables` | comparisons as text |
+| `plots` | curves of runs of both kinds |
+| `cutaways` | pictures of a bed and its interface mesh, cut open |
+| `examples` | the course that all examples take |
+
+The folder `validation` is what `validation/run.sh` is made of:
+
+| module | what it is for |
+| --- | --- |
+| `validation.command` | the command: its options and its course |
+| `validation.cases` | what a folder of `validation/cases/` says |
+| `validation.points` | the ways in which a case is run: unculled, tolerances, the paper's scheme, by hand |
+| `validation.case_runs` | the beds and the runs of a case |
+| `validation.short_cases` | each case's deck cut short to a few steps |
+| `validation.case_results` | what the runs of a case gave, as plain data |
+| `validation.fields` | coarse-grained fields of a bed, and their distance |
+| `validation.verdicts` | two one-sided tests on pairs of runs, and what they say of a case |
+| `validation.slices` | a picture of what moves, in a slice of the bed |
+| `validation.report_plots` | plots of the report |
+| `validation.pages` | text, tables and pictures as Markdown and HTML |
+| `validation.report` | the report, and what of it is kept with the sources |
+| `validation.kept_figures` | results files that are kept with the sources |
+| `validation.first_page` | rows and plot of README.md, made of those files |
+"""

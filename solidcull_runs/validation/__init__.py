@@ -1,0 +1,1 @@
+"""What `validation/run.sh` is made of; the table in the package above says what each module is for."""
