@@ -241,7 +241,7 @@ TEST(ShellClosure, a_body_that_moves_to_a_wall_is_fetched_and_one_that_the_wall_
     EXPECT_EQ(row.fetch(), 0u) << plane;
     row.parts.closure.begin_run(true);  // a deck may have changed its walls
     EXPECT_EQ(row.fetch(), 10u) << plane;
-    row.parts.closure.run_has_begun();
+    row.parts.closure.end_setup();
   }
 }
 
