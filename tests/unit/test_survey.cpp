@@ -474,7 +474,7 @@ TEST(Awake, out_of_balance_by_less_than_twice_the_limit) {
   bed.row(1, 2, Vec3::Zero());
   bed.row(3, 2, Vec3(0, 0.1, 0));
   bed.begin();
-  const double limit = bed.parts.scales.solid_state().force * bed.weight();
+  const double limit = bed.parts.bed.scales.solid_state().force * bed.weight();
   bed.world.atoms.f[3 * bed.world.at(1)] = 1.5 * limit;
   bed.world.atoms.f[3 * bed.world.at(3)] = 3 * limit;
   bed.look();
@@ -503,8 +503,8 @@ TEST(Awake, woken_and_still_there_is_awake_in_vain) {
   Bed bed;
   bed.row(1, 3, Vec3::Zero());
   bed.begin();
-  bed.parts.survey.wakes(bed.world.at(1));
-  bed.parts.survey.wakes(bed.world.at(2));
+  bed.parts.survey.note_wake(bed.world.at(1));
+  bed.parts.survey.note_wake(bed.world.at(2));
   bed.parts.survey.rows()[bed.world.at(2)].woke_at += Vec3(0, 0, 0.02 * 2 * r);
   bed.look();
   EXPECT_EQ(awake(bed).in_vain, 1);

@@ -20,7 +20,7 @@ struct Row {
     ++world.run.step;
     parts.put_away({7});
     parts.reneighbour();
-    parts.meter.lists_are_new();
+    parts.meter.note_new_lists();
   }
   RunWork after(int steps) {
     for (int n = 0; n < steps; ++n) parts.meter.count_step(0);
