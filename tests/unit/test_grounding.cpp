@@ -48,7 +48,7 @@ struct Resting {
     parts.motion.refresh();
     parts.grounding.update();
     parts.bed.groups.settle();
-    parts.motion.refresh();
+    parts.motion.refresh_in_step();
     parts.grounding.share_out_loads();
   }
   void ground() {
