@@ -3,6 +3,7 @@
 data/validation_result.json is the result of `validation/run.sh --quick slow_impact`, with every eighth point of its curves.
 """
 import collections
+import contextlib
 import json
 import math
 import os
@@ -22,7 +23,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT / "validation"))
-from solidcull_runs import cases, ensembles, equivalence, few, fields, judgement, logs, points, publish, report, validate  # noqa: E402
+from solidcull_runs import cases, ensembles, equivalence, few, fields, first_page, judgement, kept, logs, points, publish, report, validate  # noqa: E402
 from solidcull_runs.errors import RunError  # noqa: E402
 
 STORED = ROOT / "tests" / "data" / "validation_result.json"
@@ -290,53 +291,105 @@ class Report(Folder):
 class Publish(Folder):
     """What of a report is kept with the sources."""
 
-    def root(self, marks=f"{publish.BEGIN}\nold\n{publish.END}"):
+    def root(self, marks=True):
         root = self.folder / "root"
-        for name in ("README.md", "examples/impact/RESULTS.md"):
+        for name, begin in (("README.md", first_page.BEGIN), ("examples/impact/RESULTS.md", publish.BEGIN)):
             (root / name).parent.mkdir(parents=True, exist_ok=True)
-            (root / name).write_text(f"before\n\n{marks}\n\nafter\n")
-        (root / "validation").mkdir(exist_ok=True)
+            (root / name).write_text(f"before\n\n{begin}\nold\n{kept.END if marks else ''}\n\nafter\n")
+        (root / first_page.SCALE).parent.mkdir(parents=True)
+        shutil.copy(ROOT / first_page.SCALE, root / first_page.SCALE)
         return root
+
+    def results(self, **of_a_case):
+        """The stored result, told of as each case that has a row in README.md, and as the impact."""
+        names = [case for case, _ in first_page.ROWS if case] + ["impact"]
+        return [{**report.read_result(STORED), "case": name, **of_a_case} for name in names]
 
     def published(self, results, root):
         page = report.write(results, self.folder / "report", None, "From a test.")
         publish.publish(results, page, self.folder / "report", root)
 
-    def test_tables_of_pages(self):
-        result = {**report.read_result(STORED), "case": "impact"}
-        root = self.root()
-        self.published([result], root)
-        sleep = judgement.judge(result)["sleep 3 0"]
+    def test_results_file_and_pages(self):
+        results, root = self.results(), self.root()
+        self.published(results, root)
+        sleep = judgement.judge(results[0])["sleep 3 0"]
         readme = (root / "README.md").read_text()
         self.assertNotIn("old", readme)
-        self.assertTrue(readme.startswith(f"before\n\n{publish.BEGIN}\n| scene |") and readme.endswith(f"|\n{publish.END}\n\nafter\n"), readme)
-        worst = max(publish.defaults(result, "sleep"), key=lambda j: j.error)
-        self.assertIn(f"| [impact](validation/cases/impact/README.md) | 6,001 | 5 s | {sleep.speed_up:.1f} | "
-                      f"{worst.error:.2f} ({worst.worst}), not decided | ", readme)
+        self.assertTrue(readme.startswith(f"before\n\n{first_page.BEGIN}\n| scene |") and readme.endswith(f"|\n{kept.END}\n\nafter\n"), readme)
+        self.assertIn("| [heap, fed on its top](validation/cases/fed_heap/README.md), 4000 kg/m3 from 0.1 m | 6,001 | 5.", readme)
+        self.assertIn(f" s | {sleep.speed_up:.1f} | ", readme)
+        self.assertEqual(readme.count("| 6,001 |"), 4, "the four cases; the strike is of another file")
+        self.assertIn("| 1,280,000 |", readme)
         self.assertIn("| depth (m) |", (root / "examples/impact/RESULTS.md").read_text())
         text = (root / "validation" / "RESULTS.md").read_text()
         self.assertEqual(re.findall(r"!\[.*?\]\((.*?)\)", text), ["all.png"])
         self.assertGreater((root / "validation" / "all.png").stat().st_size, 5000)
-        before = readme
-        self.published([result], root)
-        self.assertEqual((root / "README.md").read_text(), before, "a second time changes nothing")
+        records = kept.read(root / first_page.CASES)
+        self.assertEqual(records, [record for r in results for record in kept.records_of(r)])
+        self.assertEqual(first_page.readme(root, records, kept.read(root / first_page.SCALE)), readme, "made of the files alone")
+        self.published(results, root)
+        self.assertEqual((root / "README.md").read_text(), readme, "a second time changes nothing")
 
-    def test_the_worst_scene_is_told(self):
-        """An error of a scene that is not the main one."""
+    def test_records_say_what_was_judged(self):
         result = report.read_result(STORED)
-        name, scene = list(result["scenes"].items())[1]
+        record, live = kept.records_of(result)[:2]
+        judged = judgement.judge(result)["sleep 3 0"]
+        unculled = judgement.unculled_of(judgement.main_scene(result))
+        depths = list(judgement.values_of(unculled, "depth").values())
+        mean = statistics.fmean(depths)
+        self.assertEqual((record["case"], record["main"], record["mode"], live["mode"]), ("slow_impact", True, "sleep", "live"))
+        self.assertEqual((record["faster"], record["verdict"]), (round(judged.speed_up, 2), judged.word))
+        self.assertEqual(record["off"][0]["figure"], judged.worst)
+        depth, = (f for f in record["off"] if f["figure"] == "depth")
+        self.assertEqual(depth, {"figure": "depth", "percent": round(100 * abs(judged.verdicts["depth"].difference) / mean, 2),
+                                 "margins": round(judged.verdicts["depth"].in_margins, 2),
+                                 "scatter": round(100 * (max(depths) - min(depths)) / mean, 2), "verdict": judged.verdicts["depth"].word})
+
+    def test_what_is_outside_in_another_scene_is_told(self):
+        """In the first page's table, among what is outside in per cent, and in README.md's row."""
+        results = self.results()
+        name, scene = list(results[0]["scenes"].items())[1]
         for run in scene["points"]["sleep 3 0"]["runs"]:
             run["values"]["depth"] *= 2
-        row = publish.summary_row(result)
-        self.assertRegex(row[4], r"^\d+\.\d+ \(depth\), \*\*outside\*\*$")
-        page = report.first_rows(result)
-        self.assertEqual([r[0].partition(", ")[2] for r in page], list(result["scenes"]))
-        self.assertEqual(page[1][5], "outside", name)
+        records = [record for r in results for record in kept.records_of(r)]
+        titles = {r["case"]: r["title"] for r in results}
+        page = report.first_rows(records, titles)
+        self.assertEqual([r[0].partition(", ")[2] for r in page[:2]], list(results[0]["scenes"]))
+        self.assertRegex(page[1][5], r"^\d+\.\d+ \(depth\)$")
+        self.assertEqual(page[1][6], "outside", name)
+        told, = (r for r in report.outside_rows(records, titles) if r[2] == "depth")
+        percent = float(told[3].removesuffix(" %"))
+        self.assertTrue(90 < percent < 110, told)
+        self.assertRegex(first_page.rows(records, kept.read(ROOT / first_page.SCALE))[0][4], rf"^\*\*.*{re.escape(name)}: depth 1?\d\d %")
+
+    def test_a_mode_that_was_not_run(self):
+        result = report.read_result(STORED)
+        for scene in result["scenes"].values():
+            del scene["points"]["live 3 0"]
+        records = kept.records_of(result)
+        self.assertEqual([(r["faster"], r["off"]) for r in records if r["mode"] == "live"], [(None, [])] * 2)
+        self.assertEqual(report.first_rows(records, {"slow_impact": "A"})[0][-3:], ["-", "-", "not run"])
+        for r in records:
+            r.update(case="fed_heap", faster=None, off=[])
+        self.refused("fed_heap was not run with `exterior sleep`", first_page.rows, records, [])
 
     def test_nothing_is_written_where_a_mark_is_missing(self):
-        root = self.root(publish.BEGIN)
-        self.refused("has no lines '<!-- made by", self.published, [report.read_result(STORED)], root)
-        self.assertFalse((root / "validation" / "RESULTS.md").exists())
+        root = self.root(marks=False)
+        self.refused("has no lines '<!-- made of", self.published, self.results(), root)
+        self.assertFalse((root / "validation" / "RESULTS.md").exists() or (root / first_page.CASES).exists())
+
+    def test_nothing_is_written_of_too_few_runs(self):
+        results, root = self.results(), self.root()
+        for entry in judgement.main_scene(results[1])["points"].values():
+            entry["runs"] = entry["runs"][:1]
+        self.refused("penetration has too few runs to publish", self.published, results, root)
+        self.assertFalse((root / first_page.CASES).exists())
+
+    def test_only_full_runs_of_all_cases_are_published(self):
+        for words in (["--publish"], ["--publish", "--full", "silo"], ["--publish", "--full", "--also", "calm 3"]):
+            with self.assertRaises(SystemExit), open(os.devnull, "w") as nowhere, contextlib.redirect_stderr(nowhere):
+                validate.options(words)
+        self.assertTrue(validate.options(["--publish", "--full"]).publish)
 
 
 class Command(Folder):

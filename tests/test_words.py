@@ -1,4 +1,4 @@
-"""The pages for users: sentences of 25 words at most, a README of 100 lines at most, no dead links; and the counter itself."""
+"""The pages for users: sentences of 25 words at most, a README of 90 lines at most, no dead links; and the counter itself."""
 import sys
 import tempfile
 import unittest
@@ -85,10 +85,10 @@ class Counter(unittest.TestCase):
                          [(2, "leads nowhere"), (3, "leads nowhere"), (4, "no such heading"), (5, "no such heading")])
         self.assertEqual(self.found("`[a](gone.md)`\n\n    [b](gone.md)\n"), [])
 
-    def test_a_readme_of_more_than_100_lines_is_found(self):
-        self.assertEqual(self.found("Line.\n" * 100, "README.md"), [])
-        self.assertEqual(self.found("Line.\n" * 101, "README.md"), [(101, "101 lines, 100 at most")])
-        self.assertEqual(self.found("Line.\n" * 101, "other.md"), [])
+    def test_a_readme_of_more_than_90_lines_is_found(self):
+        self.assertEqual(self.found("Line.\n" * 90, "README.md"), [])
+        self.assertEqual(self.found("Line.\n" * 91, "README.md"), [(91, "91 lines, 90 at most")])
+        self.assertEqual(self.found("Line.\n" * 91, "other.md"), [])
 
 
 if __name__ == "__main__":

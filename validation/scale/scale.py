@@ -2,7 +2,7 @@
 """One impact on ever larger beds: what a granule that rests costs, culled, unculled, and frozen by hand.
 
     validation/scale/scale.py [--sizes 20k,160k,1.28M,10.24M] [--only unculled,culled,asleep,control] [--runs n] [--idle]
-                              [--few-steps]
+                              [--publish] [--few-steps]
 
 Makes the beds that are missing (out/bed-SIZE.restart), then runs each size unculled (impact.in without its fix line), culled
 (impact.in) and by hand (control.in), in turns, each on one core, and prints run times, parts, memory and errors. `asleep` runs
@@ -10,6 +10,7 @@ Makes the beds that are missing (out/bed-SIZE.restart), then runs each size uncu
 Every run is kept in out/runs/; a run that is there, made of the same decks, bed and (culled) launcher, is not repeated, so that an
 interrupted series goes on where it stopped. All figures: out/scale.json, table out/scale.txt, plot out/scale.png.
 `--idle`: no ball, nothing moves. `--few-steps`: tiny beds, a few steps, always run anew; what can be checked then is. `--table`: runs nothing, prints what is there.
+`--publish`: keeps the figures with the sources, see published.py.
 Exit: 0 all runs there and no granule lost, 1 else, 2 a run failed.
 """
 import argparse
@@ -29,6 +30,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 import culled_files  # noqa: E402
 import lay_culled  # noqa: E402
+import published  # noqa: E402
 import tiles  # noqa: E402
 from solidcull_runs import beds, decks, engine, errors, examples, logs, metrics, plots, tables  # noqa: E402
 from solidcull_runs.dumps import element_normal_loads, read_final  # noqa: E402
@@ -378,9 +380,9 @@ def own_time(run):
 
 def summary(runs):
     first = runs[0]
-    result = {"runs": [r["name"] for r in runs], "loop_times": [r["loop_time"] for r in runs], "own_times": list(map(own_time, runs)),
+    result = {"runs": [r["name"] for r in runs], "stale": [r["name"] for r in runs if r["stale"]], "loop_times": [r["loop_time"] for r in runs], "own_times": list(map(own_time, runs)),
               "loop_time": statistics.median(r["loop_time"] for r in runs), "own_time": statistics.median(map(own_time, runs)),
-              "steps": first["steps"], "granules": first["granules"], "wall": statistics.median(r["wall"] for r in runs),
+              "others_busy": [r["others_busy"] for r in runs], "steps": first["steps"], "granules": first["granules"], "wall": statistics.median(r["wall"] for r in runs),
               "cpu": statistics.median(r["cpu"] for r in runs),
               "peak_mb": max(r["peak_mb"] for r in runs), "steady_mb": statistics.median(map(steady_mb, runs))}
     result["granule_steps_per_s"] = first["granules"] * first["steps"] / result["loop_time"]
@@ -473,8 +475,11 @@ def main(argv=None):
     p.add_argument("--idle", action="store_true")
     p.add_argument("--beds", action="store_true", help="makes the beds, runs nothing")
     p.add_argument("--table", action="store_true")
+    p.add_argument("--publish", action="store_true", help="keeps the figures with the sources: results.json, RESULTS.md, README.md")
     p.add_argument("--few-steps", action="store_true")
     settings = p.parse_args(argv)
+    if settings.publish and (settings.idle or settings.few_steps or settings.steps or settings.culling != SLEEP):
+        p.error("--publish takes the strike as it is, and none of --idle, --few-steps, --steps, --culling")
     few_steps = settings.few_steps
     if few_steps:
         globals().update(FEW)
@@ -522,6 +527,9 @@ def main(argv=None):
     print("\n" + text)
     lost = any(c["lost"] or not c["ids_good"] for r in report.values() for c in r["against"].values()) or \
         any(r["kinds"]["asleep"]["granules"] != LAID[size][0][0] * LAID[size][0][1] * GRANULES + 1 for size, r in report.items() if size in LAID)
+    if settings.publish:
+        published.refuse(lost, [name for r in report.values() for s in r["kinds"].values() for name in s["stale"]])
+        published.publish([*published.strike_records(report), *published.asleep_records(report)])
     return 1 if lost else 0
 
 

@@ -1,12 +1,12 @@
 #!/usr/bin/python3
 """Tools in the beds of scale.py: what a blade, a block, a wheel and a second pour cost, culled and unculled, in two sizes of bed.
 
-    validation/scale/tools.py [--sizes 20k,160k] [--only blade,block,wheel,pour] [--runs n] [--culling KEYWORDS] [--table] [--few-steps]
+    validation/scale/tools.py [--sizes 20k,160k] [--only blade,block,wheel,pour] [--runs n] [--culling KEYWORDS] [--table] [--publish] [--few-steps]
 
 Runs each tool's deck (tool_NAME.in) unculled and culled, in turns, each on one core, and prints speed, counts and errors. Who moves is
 counted in the unculled runs: by more than a hundredth of a diameter between two looks, 200 steps apart. Runs are kept in out/tools/ and
 used again while decks, bed and (culled) launcher are the same. All figures: out/tools.json, table out/tools.txt.
-`--few-steps`: tiny beds, a few steps, always run anew; what can be checked then is.
+`--publish`: keeps the figures with the sources, see published.py. `--few-steps`: tiny beds, a few steps, always run anew; what can be checked then is.
 Exit: 0 all runs there and no granule lost, 1 else, 2 a run failed.
 """
 import argparse
@@ -17,6 +17,7 @@ import statistics
 
 import numpy as np
 
+import published
 import scale
 from solidcull_runs import decks, errors, logs, meshes, metrics, tables  # scale.py has made them known
 from solidcull_runs.dumps import read_final, snapshots
@@ -160,7 +161,7 @@ def compared(unculled, culled):
         return statistics.fmean(r[what] for r in culled)
     own_time = [statistics.median(map(scale.own_time, runs)) for runs in (unculled, culled)]
     n, steps, moving = unculled[0]["granules"], unculled[0]["steps"], unculled[0]["movers"]
-    return {"runs": [len(unculled), len(culled)], "times": own_time, "speed_up": own_time[0] / own_time[1], "movers": moving,
+    return {"runs": [len(unculled), len(culled)], "stale": [r["name"] for r in (*unculled, *culled) if r["stale"]], "times": own_time, "speed_up": own_time[0] / own_time[1], "movers": moving,
             "exterior": mean("exterior"), "interface": mean("interface"), "over_movers": (mean("exterior") + mean("interface")) / max(1, moving),
             "restored": mean("restored") / n * 1e4 / steps, "steps": steps,
             "lost": max((n - r["granules"] for r in culled), key=abs), "ids_good": all(r["ids"] == unculled[0]["ids"] for r in culled),
@@ -186,8 +187,11 @@ def main(argv=None):
     p.add_argument("--runs", type=int, default=1, help=f"of each kind, 1 to {len(scale.SHIFTS)}; three and more give the noise floor")
     p.add_argument("--culling", default=scale.SLEEP, help="the keywords of the fix")
     p.add_argument("--table", action="store_true", help="runs nothing, prints what is there")
+    p.add_argument("--publish", action="store_true", help="keeps the figures with the sources: results.json, RESULTS.md, README.md")
     p.add_argument("--few-steps", action="store_true")
     settings = p.parse_args(argv)
+    if settings.publish and (settings.few_steps or settings.culling != scale.SLEEP):
+        p.error("--publish takes the tools as they are, and neither --few-steps nor --culling")
     scale.few_steps = settings.few_steps
     if settings.few_steps:
         vars(scale).update(scale.FEW)
@@ -206,12 +210,17 @@ def main(argv=None):
                 for kind in runs:
                     runs[kind] += [r for r in [one_run(name, size, kind, k, settings)] if r]
             if all(runs.values()):
-                report[size, name] = compared(*runs.values())
+                copies = scale.BEDS[size][0]
+                report[size, name] = {"bed": scale.GRANULES * copies[0] * copies[1], **compared(*runs.values())}
     text = table(report)
     (scale.OUT / "tools.json").write_text(json.dumps({f"{s} {n}": c for (s, n), c in report.items()}, indent=1) + "\n")
     (scale.OUT / "tools.txt").write_text(text + "\n")
     print("\n" + text)
-    return 1 if any(c["lost"] or not c["ids_good"] for c in report.values()) else 0
+    lost = any(c["lost"] or not c["ids_good"] for c in report.values())
+    if settings.publish:
+        published.refuse(lost, [name for c in report.values() for name in c["stale"]])
+        published.publish(published.tool_records(report))
+    return 1 if lost else 0
 
 
 if __name__ == "__main__":

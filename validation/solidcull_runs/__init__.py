@@ -28,4 +28,5 @@ What `validation/run.sh` is made of, besides:
 | `fields` | coarse-grained fields and their distance |
 | `moving` | series that several cases measure |
 | `figures`, `report`, `publish` | plots, the page, and what of it is kept with the sources |
+| `kept`, `first_page` | results files that are kept with the sources; rows and plot of README.md, made of them |
 """

@@ -90,6 +90,11 @@ def judge(result, scene=None):
     return judged
 
 
+def default_of(judged, family):
+    """The default point of a mode, if it was run."""
+    return next((j for j in judged.values() if j.default and j.family == family), None)
+
+
 def noise_of(result):
     """The scatter of the unculled runs in margins: the largest of any metric."""
     unculled = unculled_of(main_scene(result))

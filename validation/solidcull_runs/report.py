@@ -1,12 +1,14 @@
 """The validation report, made of results alone: Markdown with pictures, and one HTML page that holds all."""
 import base64
 import html
+import itertools
 import json
 import re
 import shutil
 from pathlib import Path
 
-from . import figures, judgement
+from . import figures, judgement, kept
+from .equivalence import OTHER
 from .errors import RunError
 from .points import BY_HAND, LIVE, PAPER, SLEEP
 
@@ -98,32 +100,41 @@ def figure_of(value, digits=3):
     return "-" if value is None else f"{value:.{digits}g}"
 
 
-def default_of(judged, family):
-    return next((j for j in judged.values() if j.default and j.family == family), None)
+def linked(record, title):
+    return f"[{record['case']}](#{anchor(title)})" + f", {record['scene']}" * bool(record["scene"])
 
 
-def shown_error(j):
-    return f"{j.error:.2f} ({j.worst})"
+def first_row(records, title):
+    """A scene in the table of the first page, of its records (see kept.py), one a mode."""
+    scene = records[0]
+    seconds = scene["unculled_s"]
+    cells = [linked(scene, title), f"{scene['granules']:,}", "-" if seconds is None else f"{seconds:.0f} s",
+             figure_of(scene["moving"])]
+    for record in records:
+        if record["faster"] is None:
+            cells += ["-", "-", "not run"]
+            continue
+        worst = record["off"][0]
+        cells += [f"{record['faster']:.2f}", f"{worst['margins']:.2f} ({worst['figure']})", record["verdict"]]
+    return cells
 
 
-def first_rows(result):
-    """A case in the table of the first page: a row for each of its scenes."""
-    rows = []
-    for name, scene in result["scenes"].items():
-        judged = judgement.judge(result, scene)
-        main = not rows
-        bound = main and result["bound"] and result["bound"]["N/N_moving"]
-        link = f"[{result['case']}](#{anchor(result['title'])})"
-        cells = [link + f", {name}" * bool(name), f"{scene['granules']:,}", figure_of(bound or None)]
-        for family in (SLEEP, LIVE):
-            j = default_of(judged, family)
-            cells += [f"{j.speed_up:.2f}", shown_error(j), j.word] if j else ["-", "-", "not run"]
-        rows.append(cells)
-    return rows
+def first_rows(records, titles):
+    """The table of the first page: a row for each scene. `titles`: of the cases, by name."""
+    scenes = itertools.groupby(records, key=lambda r: (r["case"], r["scene"]))
+    return [first_row(list(of_scene), titles[case]) for (case, _), of_scene in scenes]
 
 
-FIRST = ["case", "granules", "N/N_moving", "`sleep`: times faster", "largest error, in margins", "verdict",
+def outside_rows(records, titles):
+    """What is outside, in per cent."""
+    return [[linked(r, titles[r["case"]]), f"`{r['mode']}`", f["figure"], "-" if f["percent"] is None else f"{f['percent']:.2g} %", f"{f['margins']:.2f}"]
+            for r in records for f in r["off"] if f["verdict"] == OTHER]
+
+
+FIRST = ["case", "granules", "LIGGGHTS", "N/N_moving", "`sleep`: times faster", "largest error, in margins", "verdict",
          "`live`: times faster", "largest error, in margins", "verdict"]
+
+OUTSIDE = ["case", "mode", "figure", "off by", "in margins"]
 
 
 def first_page(page, results, folder, how):
@@ -133,7 +144,12 @@ def first_page(page, results, folder, how):
               "granules are 10 mm wide by 100 µm. Culled runs start from the same restart file. An error is what a culled run differs from the unculled one that starts alike, mean of all pairs. It is given in margins, "
               "which each case's README has fixed before. The verdict is that of two one-sided tests at 5 %: `equivalent`, "
               "`outside`, or `not decided` where the runs scatter too much to tell. Time is that of a core in LIGGGHTS's loop.")
-    page.table(FIRST, [row for r in results for row in first_rows(r)])
+    records, titles = [record for r in results for record in kept.records_of(r)], {r["case"]: r["title"] for r in results}
+    page.table(FIRST, first_rows(records, titles))
+    outside = outside_rows(records, titles)
+    if outside:
+        page.text("What is outside:")
+        page.table(OUTSIDE, outside)
     thrown = sum(r["lost_refilled"] for r in results)
     page.text(f"Granules lost, in all culled runs: {sum(r['lost'] for r in results)}" +
               (f"; by the paper's scheme, whose new packings throw some out of the box: {thrown}" if thrown else "") +
@@ -148,7 +164,7 @@ def first_page(page, results, folder, how):
 def metric_rows(result, judged):
     """Head and rows of the table of a case's metrics: unculled, and at the defaults."""
     unculled = judgement.unculled_of(judgement.main_scene(result))
-    defaults = [j for j in (default_of(judged, SLEEP), default_of(judged, LIVE)) if j]
+    defaults = [j for j in (judgement.default_of(judged, SLEEP), judgement.default_of(judged, LIVE)) if j]
     rows = []
     for m in result["metrics"]:
         values = list(judgement.values_of(unculled, m["name"]).values())

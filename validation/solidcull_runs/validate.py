@@ -31,11 +31,11 @@ def options(argv):
     p.add_argument("--at-once", type=int, default=cores(), metavar="N", help="runs at the same time (default: one a core)")
     p.add_argument("--out", type=Path, default=HERE / "out", metavar="FOLDER", help="beds, logs and results")
     p.add_argument("--report", type=Path, default=None, metavar="FOLDER", help="default: validation/report/SIZE")
-    p.add_argument("--publish", action="store_true", help="keep the report with the sources: validation/RESULTS.md and the README's table")
+    p.add_argument("--publish", action="store_true", help="keep the report with the sources: validation/RESULTS.md, results.json, and the README's rows")
     p.set_defaults(size="quick")
     a = p.parse_args(argv)
-    if a.publish and (a.few_steps or a.case or a.also):
-        p.error("--publish takes all cases, and neither --few-steps nor --also")
+    if a.publish and (a.few_steps or a.case or a.also or a.size != "full"):
+        p.error("--publish takes all cases, --full, and neither --few-steps nor --also")
     if a.at_once < 1:
         p.error("--at-once takes 1 or more")
     return a
