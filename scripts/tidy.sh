@@ -15,7 +15,10 @@ if [ "${1:-}" = --changed ]; then
     exit 77
   fi
   differ=$(git diff --name-only --diff-filter=d "$base" -- $folders)
-  mapfile -t files < <(sed -nE '/\.(cpp|h)$/p' <<<"$differ")
+  # a header is read with its .cpp where that differs too
+  mapfile -t files < <(sed -nE '/\.(cpp|h)$/p' <<<"$differ" | while read -r f; do
+    [[ $f == *.h ]] && grep -qxF "${f%.h}.cpp" <<<"$differ" || echo "$f"
+  done)
   [ ${#files[@]} -gt 0 ] || { echo "tidy: nothing has changed since $(git describe --always "$base")"; exit 0; }
 elif [ $# -eq 0 ]; then
   mapfile -t files < <(find $folders -name '*.cpp' | sort)
