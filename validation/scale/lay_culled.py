@@ -28,9 +28,8 @@ import tiles  # noqa: E402
 from solidcull_runs import errors  # noqa: E402
 
 WORDS, NUMBERS = files.WORDS, np.dtype("<f8")
-# columns of interior granules, of interface granules and of contacts: see store_section.h
-TAG, BODY, PLACE, RADIUS, MASS, LAYOUT, CHANGE, HELD, RECORD = 0, 1, 2, 5, 6, 8, 11, 15, 16
-I_RADIUS, I_MASS, I_HELD, I_COLUMNS = 5, 6, 7, 8
+# columns of granules, in the order of StoredGranule::each_number(), and of contacts: see store_section.h
+TAG, BODY, PLACE, RADIUS, MASS, CHANGE, LAYOUT, HELD, RECORD = 0, 1, 2, 5, 6, 9, 13, 15, 16
 LOW, HIGH, C_BODY, KNOWN, HISTORY = range(5)
 VECTOR_WIDTH = 3
 # numbers of a body, in the order of SolidBody::each_number()
@@ -115,7 +114,7 @@ class Source:
                     table, rows, at = files.unpacked_table(data, at)
                     self.split_interior(np.array(files.full(table)))
         self.interior = [{length: np.concatenate(parts, axis=1) for length, parts in sorted(of.items())} for of in self.interior]
-        self.interface = [np.concatenate(parts, axis=1) if parts else np.empty((I_COLUMNS, 0), WORDS) for parts in self.interface]
+        self.interface = [np.concatenate(parts, axis=1) if parts else np.empty((RECORD, 0), WORDS) for parts in self.interface]
         self.contacts = [{way: np.concatenate(parts, axis=1) for way, parts in of.items()} for of in contacts]
         self.packed = {}
         self.body_of = np.full((n, self.size), self.main)
@@ -172,6 +171,7 @@ class Source:
         x[:, 0] -= self.margin + (tile // self.copies[1]) * self.period
         x[:, 1] -= self.margin + (tile % self.copies[1]) * self.period
         table[place:place + 3] = words(x.T)
+        table[CHANGE:CHANGE + 3] = words(np.einsum("nij,nj->ni", self.turns[body], numbers(table[CHANGE:CHANGE + 3].T)).T)
         table[TAG] = (tag - 1 - tile * self.size).astype(WORDS)
         return tile
 
@@ -181,8 +181,6 @@ class Source:
             self.interface[t].append(table[:, tile == t])
 
     def split_interior(self, table):
-        body = table[BODY].astype(int)
-        table[CHANGE:CHANGE + 3] = words(np.einsum("nij,nj->ni", self.turns[body], numbers(table[CHANGE:CHANGE + 3].T)).T)
         tile = self.to_world(table, PLACE)
         # what is on a mesh is on that element there: a granule on two at once is on the one below it
         for layout in np.unique(table[LAYOUT]):
@@ -327,14 +325,13 @@ def lay(source, file, copies, floor, top, shift=0.0):
     bodies = Bodies(source, like, index)
     for place in laid:
         t = like[place]
-        for key, table in list(source.interior[t].items()) + [(None, source.interface[t])]:
+        for table in [*source.interior[t].values(), source.interface[t]]:
             if not table.shape[1]:
                 continue
             x = numbers(table[PLACE:PLACE + 3].T) + corner[place]
-            radius, mass, held = (I_RADIUS, I_MASS, I_HELD) if key is None else (RADIUS, MASS, HELD)
             # few granules are of other bodies: their numbers are made now, so that the part can stand before the granules
             numbers_here = bodies.numbers_of(index[place], table[BODY].astype(int))
-            bodies.add(numbers_here, x, numbers(table[radius]), numbers(table[mass]), table[held].astype(int))
+            bodies.add(numbers_here, x, numbers(table[RADIUS]), numbers(table[MASS]), table[HELD].astype(int))
     total = size * len(laid)
     interface = sum(source.interface[t].shape[1] for t in like.values())
     identity = int.from_bytes(hashlib.sha256(struct.pack("<4q", *copies, size, source.step) + os.urandom(16)).digest()[:8], "little")
@@ -352,7 +349,7 @@ def lay(source, file, copies, floor, top, shift=0.0):
             x = words((numbers(table[PLACE:PLACE + 3].T) + corner[place]).T)
             body = bodies.numbers_of(index[place], table[BODY].astype(int))
             tag = table[TAG] + WORDS.type(index[place] * size + 1)
-            out.put(files.INTERFACE, table.shape[1], files.packed_table([tag, body, *x, table[I_RADIUS], table[I_MASS], table[I_HELD]], len(tag)),
+            out.put(files.INTERFACE, table.shape[1], files.packed_table([tag, body, *x, *table[RADIUS:]], len(tag)),
                     files.packed_table([np.empty(0, WORDS)] * (HISTORY + source.width), 0))
         strange = 0
         for place in laid:
@@ -371,7 +368,7 @@ def lay(source, file, copies, floor, top, shift=0.0):
                 count += table.shape[1]
             edges = contacts_of(source, bodies, place, like, index, copies)
             contacts += edges.shape[1]
-            out.put(files.INTERIOR, count, files.packed_table([np.empty(0, WORDS)] * I_COLUMNS, 0),
+            out.put(files.INTERIOR, count, files.packed_table([np.empty(0, WORDS)] * RECORD, 0),
                     files.packed_table(list(edges), edges.shape[1]), struct.pack("<Q", len(own)), *own)
         out.close(total - interface, interface, contacts)
     part.rename(file)
@@ -450,9 +447,9 @@ def touch(source, like, corner, sides, radius):
     for place, t in like.items():
         if (abs(corner[place][:2] + source.period / 2 - middle) > source.period).any():
             continue
-        for key, table in [*source.interior[t].items(), (None, source.interface[t])]:
+        for table in [*source.interior[t].values(), source.interface[t]]:
             x = numbers(table[PLACE:PLACE + 3].T) + corner[place]
-            r = numbers(table[I_RADIUS if key is None else RADIUS]) + radius
+            r = numbers(table[RADIUS]) + radius
             under = ((x[:, :2] - middle)**2).sum(1)
             below = under < r * r
             if below.any():
