@@ -33,7 +33,7 @@ struct Settings {
   WallCover walls = WallCover::closed;
   Store store = Store::exact;
   Restore restore = Restore::exact;
-  double voxel = 0.5;          ///< in mean diameters
+  double voxel = 0.5;  ///< in mean diameters
   ReportLength report = ReportLength::brief;
   std::vector<Output> meshes;  ///< interface meshes; the keyword may stand more than once
   std::vector<Output> beds;    ///< the whole bed; likewise

@@ -271,7 +271,8 @@ const Refusal refusals[] = {
     {"depth 0.8 exterior live", "voxel 0.5 is too coarse for depth 0.8: choose voxel <= depth/2"},
 
     {"deptth 2",
-     "unknown keyword 'deptth': choose from bed, calm, carve, depth, every, exterior, mesh, motion, report, restore, speed, store, "
+     "unknown keyword 'deptth': choose from bed, calm, carve, depth, every, exterior, mesh, motion, report, restore, speed, "
+     "store, "
      "tolerance, voxel, walls"},
     {"calm 3 4",
      "unknown keyword '4': choose from bed, calm, carve, depth, every, exterior, mesh, motion, report, restore, speed, store, "
