@@ -34,7 +34,7 @@ void Change::make(Look& look, Phase phase) {
   if (!bed_.census.something_locked() && !bed_.ranks.any(look.chosen().any_here() || p_.wake.any_at_all())) return;
   if (phase == Phase::stepping) bed_.memory.make_room(look.chosen().chosen.size());
   p_.refill.begin_change();
-  MembershipChange c(p_.for_change(), p_.wake.take(bed_.ranks, bed_.scales.wake_up()), look.take());
+  MembershipChange c(bed_, p_.for_change(), p_.wake.take(bed_.ranks, bed_.scales.wake_up()), look.take());
   const bool changes = bed_.ranks.any(c.any_here() || p_.grounding.lets_go());
   bool shell_changed = false;
   p_.grounding.let_go();

@@ -41,8 +41,8 @@ struct CullingParts {
   void ask_for_build(std::int64_t step) {
     if (bed.run.ask_for_reneighbouring(step)) pacing.count_build();
   }
-  /// What a membership change works on.
-  MembershipChange::Parts for_change() { return {bed, survey, exchange, closure, freezing}; }
+  /// What a membership change works on besides the bed.
+  MembershipChange::Parts for_change() { return {survey, exchange, closure, freezing}; }
 
   Bed bed;
 

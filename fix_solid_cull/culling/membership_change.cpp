@@ -7,8 +7,8 @@
 
 namespace solidcull {
 
-MembershipChange::MembershipChange(const Parts& parts, Wakes wakes, Proposal proposal)
-    : bed_(parts.bed), p_(parts), wakes_(std::move(wakes)), proposal_(std::move(proposal)) {
+MembershipChange::MembershipChange(Bed& bed, const Parts& parts, Wakes wakes, Proposal proposal)
+    : bed_(bed), p_(parts), wakes_(std::move(wakes)), proposal_(std::move(proposal)) {
   bed_.solid.count_carves(wakes_.carves);
   changes_.joins = proposal_.joins;
 }

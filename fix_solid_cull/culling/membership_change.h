@@ -1,5 +1,5 @@
 // One reneighbouring: exterior <-> interface <-> interior (theory.md#restoring says what a granule gets back).
-// Lives on the stack of Culling::change().
+// Lives on the stack of Change::make().
 #pragma once
 
 #include <cstdint>
@@ -12,22 +12,20 @@
 #include "store_exchange.h"
 #include "survey.h"
 #include "wake_requests.h"
-#include "wall_survey.h"
 
 namespace solidcull {
 
-/// Who changes between exterior and interface, step by step; the steps that concern all of the culling stand in Culling.
+/// Who changes between exterior and interface, step by step; the steps that concern all of the culling stand in Change.
 class MembershipChange {
  public:
   struct Parts {
-    Bed& bed;
     Survey& survey;
     StoreExchange& exchange;
     ShellClosure& closure;
     ContactFreezing& freezing;
   };
 
-  MembershipChange(const Parts& parts, Wakes wakes, Proposal proposal);
+  MembershipChange(Bed& bed, const Parts& parts, Wakes wakes, Proposal proposal);
 
   /// Whether anything changes by wakes and proposal, on this rank. Local.
   bool any_here() const { return !wakes_.none() || proposal_.any_here(); }

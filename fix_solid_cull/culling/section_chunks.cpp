@@ -5,7 +5,6 @@
 #include <string>
 
 #include "bits.h"
-#include "store_exchange.h"
 
 namespace solidcull {
 namespace {

@@ -48,7 +48,7 @@ struct WorldParts : CullingParts {
   /// One membership change as Culling makes it, but for what goes to the store and comes out by the shell's closure. Collective.
   void change(Wakes wakes, Proposal proposal) {
     exchange.begin_change();
-    MembershipChange c(for_change(), std::move(wakes), std::move(proposal));
+    MembershipChange c(bed, for_change(), std::move(wakes), std::move(proposal));
     bed.index.index(world.atoms);
     c.free_and_lock();
     c.thaw_and_unlock();
