@@ -264,8 +264,6 @@ class KeywordRefusals(Case):
         "tolerance x 0": ("tolerance", "x", TOLERANCE), "tolerance 3 -1": ("tolerance", "-1", TOLERANCE),
         "tolerance 0 0": ("tolerance", "0 0", TOLERANCE), "tolerance 3": ("tolerance", None, TOLERANCE),
         "carve x 4": ("carve", "x", CARVE), "carve 2 0.5": ("carve", "0.5", CARVE), "carve 2": ("carve", None, CARVE),
-        "motion free": ("motion", "free", "'rigid' or 'fixed'"), "motion": ("motion", None, "'rigid' or 'fixed'"),
-        "walls open": ("walls", "open", "'closed' or 'surface'"), "walls": ("walls", None, "'closed' or 'surface'"),
         "store some": ("store", "some", STORE), "store": ("store", None, STORE),
         "restore new": ("restore", "new", "'exact' or 'refill'"), "restore": ("restore", None, "'exact' or 'refill'"),
         "report all": ("report", "all", "'short' or 'full'"), "report": ("report", None, "'short' or 'full'"),
@@ -273,13 +271,20 @@ class KeywordRefusals(Case):
         "mesh x a.stl": ("mesh", "x", FILE), "mesh 10 a.obj": ("mesh", "a.obj", MESH), "mesh 10": ("mesh", None, MESH),
         "bed 0 a.vtp": ("bed", "0", FILE), "bed 10 a.stl": ("bed", "a.stl", BED), "bed": ("bed", None, FILE),
     }
-    KEYWORDS = "bed, calm, carve, depth, every, exterior, mesh, motion, report, restore, speed, store, tolerance, voxel, walls"
+    KEYWORDS = "bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, store, tolerance, voxel"
 
     def test_wrong_type_range_and_missing_values(self):
         for words, (keyword, value, wanted) in self.WRONG.items():
             with self.subTest(words):
                 what = "ends too early" if value is None else f"has the value '{value}'"
                 self.refused_by_fix(deck(f"{FIX} {words}", granules=False), f"keyword '{keyword}' {what}: give {wanted}")
+
+    def test_keywords_that_are_no_more(self):
+        for words, why in (("motion fixed", "bodies that walls hold stand still by themselves"),
+                           ("walls surface", "walls that stand still always count as cover")):
+            with self.subTest(words):
+                self.refused_by_fix(deck(f"{FIX} {words}", granules=False),
+                                    f"keyword '{words.split()[0]}' is no more: leave it and its value out; {why}")
 
     def test_no_cover_below_a_live_surface(self):
         for words in ("exterior live depth 0", "depth 0 exterior live"):

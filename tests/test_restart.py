@@ -120,16 +120,6 @@ class Restart(Case):
         self.refused_by_fix(resumed(self.file(1), f"{none}\nrun 0\n"),
                             "the restart file was written with 'store exact' or 'compact': read it with that store")
 
-    def test_a_file_of_fixed_bodies_read_as_rigid_ones(self):
-        for ranks in (1, 2):
-            with self.subTest(ranks=ranks):
-                file = self.place / f"fixed-{ranks}.restart"
-                self.accepted(BLOCK + f"{CULL_BLOCK} motion fixed\nrun {BEFORE}\nwrite_restart {file}\n", ranks=ranks)
-                end = self.end_of(resumed(file, f"{CULL_BLOCK}\nrun {AFTER}\n", END), ranks)
-                self.assertEqual(sorted(end), list(range(1, GRANULES)))
-                for tag, row in end.items():
-                    self.assertTrue(0 < row[4] < 0.0211, f"granule {tag} is at height {row[4]}")
-
     def test_an_insertion_before_the_fix_line(self):
         insertion = "fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0015\n" \
                     "fix dist all particledistribution/discrete 32452843 1 t1 1\n" \

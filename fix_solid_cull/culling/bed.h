@@ -8,6 +8,7 @@
 #include "census.h"
 #include "granule_masses.h"
 #include "stored_search.h"
+#include "wake_requests.h"
 
 namespace solidcull {
 
@@ -30,6 +31,7 @@ struct Bed : BedState, BodyFollower {
   const GranuleMasses masses;
   BodyGroups groups;
   Census census;
+  mutable WakeRequests wake;  ///< whoever sees the bed may ask it to wake
 };
 
 }  // namespace solidcull

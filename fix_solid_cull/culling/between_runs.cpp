@@ -85,7 +85,7 @@ std::int64_t BetweenRuns::restore_all(Phase phase) {
     p_.shown.shown() ? hide_bed() : leave_lists();
     bed_.ranks.update();
     change_.forget_lost();
-    p_.wake.ask_all();
+    bed_.wake.ask_all();
     change_.make(look_, phase);
     p_.shown.give_changes();
   }

@@ -127,7 +127,6 @@ void BodyGroups::group() {
 
 void BodyGroups::settle() {
   group();
-  if (!bed_.scales.rigid()) return;
   for (auto& [number, body] : bed_.solid.bodies_in_motion()) {
     const bool spans_ranks = spans(number);
     // what was a part of a larger body may have become a body of its own without a change of its granules

@@ -86,7 +86,7 @@ inline void BodyMotion::add_to_body(std::size_t k, const Vec3& contact, const Ve
 
 void BodyMotion::take_loads() {
   largest_excess_ = 0;
-  const bool moves = bed_.scales.rigid(), turns = bed_.contacts.turn_granules;
+  const bool turns = bed_.contacts.turn_granules;
   const Vec3 g = bed_.run.gravity();
   const WakeUpLaw& law = bed_.scales.wake_up();
   Atoms& atoms = bed_.atoms;
@@ -96,7 +96,7 @@ void BodyMotion::take_loads() {
     const Vec3 in_world = atoms.force(i), torque = vec(atoms.torque + 3 * std::size_t(i));
     if (!std::isfinite(in_world.sum() + torque.sum())) refuse_no_number(atoms.tag[i], "load", in_world);
     ActiveBody& a = active_[slot_[k]];
-    if (moves && !a.stands) add_to_body(k, in_world - atoms.mass[i] * g, turns ? torque : Vec3(Vec3::Zero()));
+    if (!a.stands) add_to_body(k, in_world - atoms.mass[i] * g, turns ? torque : Vec3(Vec3::Zero()));
     if (a.stands) a.change += in_world - atoms.mass[i] * g;
     const double tolerance = law.tolerance(atoms.mass[i], bed_.shell[i].normal_load);
     largest_excess_ = std::max(largest_excess_, bed_.shell.take_load(i, a.body->pose.turned_to_frame(in_world), tolerance));
@@ -106,7 +106,6 @@ void BodyMotion::take_loads() {
   if (bed_.scales.sleeping())
     for (ActiveBody& a : active_)
       if (a.stands) a.change += bed_.solid.wall_loads().force(a.number) + a.body->mass.mass * g;
-  if (!moves) return;
   // contacts and other forces on interface granules are there; gravity pulls the whole mass
   for (ActiveBody& a : active_) a.torque += (a.body->pose.origin() - a.body->motion.centre()).cross(a.force);
   sum_over_ranks();

@@ -13,7 +13,7 @@ namespace solidcull {
 struct ActiveBody {
   int number;
   SolidBody* body;
-  bool stands = false;         ///< grounded, or all bodies are fixed
+  bool stands = false;         ///< grounded
   Vec3 change = Vec3::Zero();  ///< if it stands: what its walls must bear beyond what is frozen, for it is in balance (N)
   Vec3 force = Vec3::Zero();   ///< if it does not: on the whole body (N)
   Vec3 torque = Vec3::Zero();  ///< and about its centre of mass (N m)

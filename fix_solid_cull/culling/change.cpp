@@ -31,41 +31,34 @@ void Change::make(Look& look, Phase phase) {
   // another fix may have deleted granules in this hook
   if (phase == Phase::stepping && bed_.census.something_locked()) forget_lost();
   bed_.memory.freed(p_.exchange.begin_change());
-  if (!bed_.census.something_locked() && !bed_.ranks.any(look.chosen().any_here() || p_.wake.any_at_all())) return;
+  if (!bed_.census.something_locked() && !bed_.ranks.any(look.chosen().any_here() || bed_.wake.any_at_all())) return;
   if (phase == Phase::stepping) bed_.memory.make_room(look.chosen().chosen.size());
   p_.refill.begin_change();
-  MembershipChange c(bed_, p_.for_change(), p_.wake.take(bed_.ranks, bed_.scales.wake_up()), look.take());
+  MembershipChange c(bed_, p_.for_change(), bed_.wake.take(bed_.ranks, bed_.scales.wake_up()), look.take());
   const bool changes = bed_.ranks.any(c.any_here() || p_.grounding.lets_go());
   bool shell_changed = false;
   p_.grounding.let_go();
   if (changes || bed_.ranks.count > 1) bed_.index.index(bed_.atoms);
   if (changes) c.free_and_lock();
-  if (bed_.scales.refills() && bed_.ranks.count > 1)  // over there they may have other sites, where the shell is not closed
-    for (const std::int64_t tag : p_.handover.stored_elsewhere()) {
-      p_.exchange.bring_back(tag);
-      shell_changed = true;
-    }
+  if (p_.refill.acts() && bed_.ranks.count > 1) shell_changed = p_.refill.fetch(p_.handover.stored_elsewhere());
   close_shell(changes, shell_changed);  // before contacts thaw: what they are given to must be atoms
-  refill(shell_changed);
+  pack(shell_changed);
   if (changes) {
-    c.thaw_and_unlock();
-    c.freeze_and_lock();
-    bed_.groups.settle();
-    c.finish_bodies();
-    bed_.census.count_bodies();
+    c.change_bodies();
+    p_.refill.note_freed(c.freed_anywhere());
     // parts that came off face each other now, or merged bodies have found other sites
-    if (bed_.census.several_bodies() || bed_.scales.refills()) close_shell(true, shell_changed);
-    refill(shell_changed);
+    if (bed_.census.several_bodies() || p_.refill.acts()) close_shell(true, shell_changed);
+    pack(shell_changed);
   }
   store_and_fetch(c, changes, shell_changed);
-  if (bed_.scales.refills() && bed_.ranks.any(shell_changed)) settle_bodies();  // granules stand elsewhere in them
+  if (p_.refill.acts() && bed_.ranks.any(shell_changed)) settle_bodies();  // granules stand elsewhere in them
   if (changes || bed_.ranks.any(shell_changed)) publish(c);
   follow_box();  // places of stored granules are rounded: the last digit of a border decides who owns what lies on it
   if (p_.handover.send_home()) count_restored();
   p_.handover.remember();
   fit_memory(phase);
   p_.motion.refresh();
-  if (bed_.scales.rigid()) p_.motion.give_velocities();
+  p_.motion.give_velocities();
 }
 
 /// What was made inside a stored granule cannot stay. Stored ones come back for each fix that inserts, so nothing that LIGGGHTS
@@ -78,7 +71,7 @@ void Change::meet_new_granules(Phase phase) {
       throw InputError("granule " + std::to_string(found.in_stored) +
                        " was inserted into the place of a culled one: give the insertion a region above the bed, or unfix " +
                        bed_.run.name + " first");
-    for (const Vec3& place : found.places) p_.wake.ask(place, bed_.scales.wake_up().radius(1));
+    for (const Vec3& place : found.places) bed_.wake.ask(place, bed_.scales.wake_up().radius(1));
   }
   p_.closure.forget_new();
 }
@@ -91,16 +84,17 @@ void Change::close_shell(bool changes, bool& shell_changed) {
 }
 
 /// What came out of a store that knows no places is packed; what it comes near to by that comes out, too.
-void Change::refill(bool& shell_changed) {
-  if (!bed_.scales.refills()) return;
+void Change::pack(bool& shell_changed) {
   while (p_.refill.pack()) close_shell(true, shell_changed);
 }
 
 /// And what nothing is near goes in.
 void Change::store_and_fetch(const MembershipChange& c, bool changes, bool& shell_changed) {
   if (changes || (bed_.scales.sleeping() && bed_.census.something_locked()))
-    shell_changed |= p_.closure.store_what_is_deep(c.locked_some(), changes) > 0;
-  if (bed_.scales.rigid() && bed_.census.something_stored()) shell_changed |= p_.closure.fetch_from_outside() > 0;
+    shell_changed |= p_.deep.store(c.locked_some(), changes, [&](const std::vector<int>& atoms, const DeepGranules::Near& near) {
+      return p_.refill.acts() ? p_.refill.put_away(atoms, near) : p_.exchange.put_away(atoms);
+    }) > 0;
+  if (bed_.census.something_stored()) shell_changed |= p_.closure.fetch_from_outside() > 0;
 }
 
 /// The engine and the report learn how many granules there are where.

@@ -28,7 +28,7 @@ class Change {
   void follow_box();
   void meet_new_granules(Phase phase);
   void close_shell(bool changes, bool& shell_changed);
-  void refill(bool& shell_changed);
+  void pack(bool& shell_changed);
   void store_and_fetch(const MembershipChange& c, bool changes, bool& shell_changed);
   void publish(const MembershipChange& c);
   void fit_memory(Phase phase);

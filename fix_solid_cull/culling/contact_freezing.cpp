@@ -135,14 +135,6 @@ void ContactFreezing::thaw(const Changes& changes) {
       }
     });
   }
-  if (bed_.scales.refills()) {
-    kept_.clear();
-    for (std::size_t g = 0; g < given.size(); ++g) kept_.insert(ordered(bed_.atoms.tag[given[g].atom], given[g].partner));
-    const HistoryRows rows = bed_.contacts.histories();
-    for (const std::int64_t tag : freed)
-      if (const int* i = bed_.index.find(tag))
-        rows.for_each_partner(*i, [&](std::int64_t partner, const double*) { kept_.insert(ordered(tag, partner)); });
-  }
   std::vector<std::uint32_t> by_atom(given.size());
   std::iota(by_atom.begin(), by_atom.end(), 0u);
   std::sort(by_atom.begin(), by_atom.end(),
@@ -158,23 +150,8 @@ void ContactFreezing::thaw(const Changes& changes) {
   thawed_ = changes.freed_anywhere;
 }
 
-/// Half of force times overlap: exact for Hooke's law, a quarter too much for Hertz's.
-void ContactFreezing::count_energy_of_new_contacts() const {
-  const Atoms& atoms = bed_.atoms;
-  double energy = 0;
-  bed_.contacts.neighbours().for_each_pair(atoms.owned, [&](int i, int j, int k) {
-    if (!thawed_.contains(atoms.tag[i]) && !thawed_.contains(atoms.tag[j])) return;
-    const double overlap = atoms.radius[i] + atoms.radius[j] - (atoms.place(i) - atoms.place(j)).norm();
-    if (overlap <= 0 || kept_.count(ordered(atoms.tag[i], atoms.tag[j]))) return;
-    const double share = j < atoms.owned ? 1.0 : 0.5;  // another rank sees it, too
-    energy += share * 0.5 * bed_.contacts.force_on_first(i, k).norm() * overlap;
-  });
-  bed_.solid.count_refilled(energy);
-}
-
 void ContactFreezing::rebase_thawed() {
   if (thawed_.empty()) return;
-  if (bed_.scales.refills()) count_energy_of_new_contacts();
   const Atoms& atoms = bed_.atoms;
   const int owned = atoms.owned;
   bed_.contacts.neighbours().for_each_pair(owned, [&](int i, int j, int k) {

@@ -3,13 +3,12 @@
 #pragma once
 
 #include <cstdint>
-#include <set>
-#include <utility>
 #include <vector>
 
 #include "bed.h"
 #include "flat_map.h"
 #include "proposal.h"
+#include "tag_pairs.h"
 
 namespace solidcull {
 
@@ -32,7 +31,7 @@ class ContactFreezing {
   /// Two bodies that touched have become one: what the engine saw between them goes inside too. Collective.
   void freeze_between_merged();
   /// At the first forces after thaw(): a contact that came out of the body brings the load that it had inside, no change for the
-  /// granule that stays. What contacts hold that were made anew by `restore refill` is energy added.
+  /// granule that stays.
   void rebase_thawed();
 
   /// The engine has searched for neighbours: pairs within bodies stand in its lists.
@@ -42,20 +41,13 @@ class ContactFreezing {
   void leave_out_inner_pairs();
 
  private:
-  using TagPairs = std::set<std::pair<std::int64_t, std::int64_t>>;
-  static std::pair<std::int64_t, std::int64_t> ordered(std::int64_t a, std::int64_t b) {
-    return {std::min(a, b), std::max(a, b)};
-  }
   bool is_locked(std::int64_t tag, const Changes& changes) const;
   bool just_locked(int i) const;
   void rebase(int i, std::int64_t partner, const double* history);
 
-  void count_energy_of_new_contacts() const;
-
   Bed& bed_;
   bool inner_pairs_listed_ = false;
   FlatMap<char> thawed_;  // granules that were freed in the last change, here or near
-  TagPairs kept_;         // with `restore refill`: contacts of theirs that have a history, lower tag first
 };
 
 }  // namespace solidcull

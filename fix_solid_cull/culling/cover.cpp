@@ -88,7 +88,7 @@ void Cover::close_behind_walls(const std::vector<WallContact>& contacts, const s
   FlatMap<Sphere> moving;
   for (const WallContact& c : contacts) {
     const int i = c.granule;
-    if (bed_.scales.settings().walls == WallCover::surface || c.gap > wall_closes * bed_.atoms.radius[i]) continue;
+    if (c.gap > wall_closes * bed_.atoms.radius[i]) continue;
     if (c.moving && !bed_.shell[i].locked && !rests(i)) continue;
     const double distance = c.to_wall.norm();
     if (distance == 0) continue;
@@ -110,7 +110,7 @@ void Cover::close_behind_walls(const std::vector<WallContact>& contacts, const s
 // ------------------------------------------------------------------------------------------------------------ drawing
 
 void Cover::follow_largest_body() {
-  if (!bed_.scales.rigid() || bed_.run.any_periodic()) return;
+  if (bed_.run.any_periodic()) return;
   const GranuleStore& store = bed_.solid.store();
   int largest = 0;
   std::int64_t count = 0;
@@ -249,7 +249,7 @@ void Cover::wake_exposed() {
     const Vec3 x = observer_.to_frame(bed_.atoms.place(i));
     if (!surface_->touched_near(x, depth + bed_.scales.closing())) continue;
     d.nearest_void = surface_->void_within(x, depth, d.nearest_void);
-    if (!d.nearest_void.none()) wake_.ask(bed_.atoms.place(i), 0.5 * bed_.atoms.radius[i]);
+    if (!d.nearest_void.none()) bed_.wake.ask(bed_.atoms.place(i), 0.5 * bed_.atoms.radius[i]);
   }
   surface_->clear_touched();
 }

@@ -15,7 +15,6 @@
 #include "per_granule.h"
 #include "sphere_cells.h"
 #include "store_exchange.h"
-#include "wake_requests.h"
 
 namespace solidcull {
 
@@ -39,10 +38,10 @@ struct Drawn {
 };
 
 /// The surface is drawn in the frame of an observer who rides on the largest body, so that a mass that falls or turns as one
-/// leaves it as it is. Walls are no surface (`walls closed`): plugs behind them close it. m.
+/// leaves it as it is. Walls are no surface: plugs behind them close it. m.
 class Cover : public BodyFollower, public StoreFollower {
  public:
-  Cover(const Bed& bed, const BodyMotion& motion, WakeRequests& wake) : bed_(bed), motion_(motion), wake_(wake) {}
+  Cover(const Bed& bed, const BodyMotion& motion) : bed_(bed), motion_(motion) {}
 
   PerGranule<Drawn>& rows() { return rows_; }
   /// The surface does not care who holds a granule: it has come out of the store.
@@ -98,7 +97,6 @@ class Cover : public BodyFollower, public StoreFollower {
 
   const Bed& bed_;
   const BodyMotion& motion_;
-  WakeRequests& wake_;
 
   PerGranule<Drawn> rows_;
   std::unique_ptr<ImplicitSurface> surface_;

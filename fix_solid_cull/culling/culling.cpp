@@ -129,7 +129,7 @@ void Culling::initial_step() {
   look_.see_walls(true);
   open_for_insertion(bed_.run.step);
   const std::int64_t step = bed_.run.step;
-  if (bed_.ranks.any(p_.wake.any_here())) p_.ask_for_build(step);
+  if (bed_.ranks.any(bed_.wake.any_here())) p_.ask_for_build(step);
   p_.pacing.begin_run(step, bed_.census.something_locked());
   if (p_.pacing.looks_at_once()) look_.look_at_once();
   if (bed_.ranks.any(look_.take_dropped())) p_.pacing.look_earlier(step);
@@ -139,7 +139,7 @@ void Culling::initial_step() {
 
 void Culling::integrate() {
   expect({Phase::stepping}, "integrate");
-  if (!bed_.solid.has_store() || !bed_.scales.rigid() || (bed_.ranks.count == 1 && p_.motion.active().empty())) return;
+  if (!bed_.solid.has_store() || (bed_.ranks.count == 1 && p_.motion.active().empty())) return;
   const auto timed = p_.report.time(Part::load);
   p_.motion.kick_and_drift();
   p_.motion.place();
@@ -171,6 +171,7 @@ bool Culling::may_ask_for_wall_loads() const {
 void Culling::take_loads() {
   const auto timed = p_.report.time(Part::load);
   p_.motion.refresh();
+  p_.refill.count_energy_of_new_contacts();
   p_.freezing.rebase_thawed();
   p_.motion.take_loads();
   if (bed_.scales.sleeping()) p_.grounding.press_on_walls();
@@ -191,7 +192,7 @@ void Culling::take_forces() {
   collect_wakes();
   if (p_.pacing.due(step)) {
     look_.look();
-    if (bed_.ranks.any(p_.wake.any_here())) p_.ask_for_build(step + 1);
+    if (bed_.ranks.any(bed_.wake.any_here())) p_.ask_for_build(step + 1);
   }
   open_for_insertion(step + 1);
 }
@@ -200,7 +201,7 @@ void Culling::take_forces() {
 /// some steps away.
 void Culling::store_what_feels_walls() {
   if (!p_.closure.take_walls_unfelt()) return;
-  const bool asked = bed_.scales.sleeping() && p_.closure.ask_to_store(p_.motion.interface_atoms());
+  const bool asked = bed_.scales.sleeping() && p_.deep.ask_to_store(p_.motion.interface_atoms());
   if (bed_.ranks.any(asked)) p_.ask_for_build(bed_.run.step + 1);
 }
 
@@ -215,11 +216,10 @@ void Culling::collect_wakes() {
   for (const int i : p_.motion.interface_atoms()) {
     const double excess = bed_.shell.take_excess(i);
     if (excess <= 1) continue;
-    p_.wake.ask_by_load(bed_.atoms.place(i), bed_.scales.wake_up().radius(excess));
+    bed_.wake.ask_by_load(bed_.atoms.place(i), bed_.scales.wake_up().radius(excess));
     waking = true;
   }
-  const bool rigid = bed_.scales.rigid();
-  std::int64_t asked[2] = {waking || (rigid && p_.motion.comes_too_far(period + 1)), rigid && p_.motion.is_fast(period + 1)};
+  std::int64_t asked[2] = {waking || p_.motion.comes_too_far(period + 1), p_.motion.is_fast(period + 1)};
   ranks.largest(asked, 2);
   if (asked[0]) p_.ask_for_build(bed_.run.step + 1);
   p_.motion.watch(asked[1] != 0);
@@ -227,7 +227,7 @@ void Culling::collect_wakes() {
 
 void Culling::finish_step() {
   expect({Phase::stepping}, "finish_step");
-  if (!bed_.solid.has_store() || !bed_.scales.rigid() || p_.motion.active().empty()) return;
+  if (!bed_.solid.has_store() || p_.motion.active().empty()) return;
   const auto timed = p_.report.time(Part::load);
   p_.motion.kick();
   p_.motion.give_velocities_to_riders();

@@ -7,22 +7,23 @@ namespace solidcull {
 CullingParts::CullingParts(const Ports& engine, const Settings& settings, int types)
     : bed(engine, settings, types),
       motion(bed),
-      gravity(bed, motion, wake),
-      walls(bed, wake),
+      gravity(bed, motion),
+      walls(bed),
       grounding(bed, motion, walls),
-      cover(bed, motion, wake),
+      cover(bed, motion),
       survey(bed, motion, walls),
       pacing(bed.scales),
       exchange(bed),
       refill(bed, exchange),
-      closure(bed, walls, exchange),
+      closure(bed, exchange),
+      deep(bed, walls, closure),
       freezing(bed),
       parcels(bed, cover),
       handover(bed, parcels),
       snapshot(bed, parcels, gravity, cover),
-      shown(bed, wake),
+      shown(bed),
       meshes(bed, shown),
-      claims(bed, wake),
+      claims(bed),
       meter(bed),
       report(bed, motion, meter),
       run_end(bed, meter, report),
@@ -31,7 +32,7 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       followers{&bed.shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown} {
   for (BodyFollower* f : std::initializer_list<BodyFollower*>{&motion, &grounding, &closure, &handover, &cover, &meshes})
     bed.solid.followed_by(*f);
-  for (StoreFollower* f : std::initializer_list<StoreFollower*>{&walls, &grounding, &cover}) exchange.followed_by(*f);
+  for (StoreFollower* f : std::initializer_list<StoreFollower*>{&walls, &grounding, &cover, &refill}) exchange.followed_by(*f);
 }
 
 }  // namespace solidcull

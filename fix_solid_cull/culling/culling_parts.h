@@ -10,6 +10,7 @@
 #include "contact_freezing.h"
 #include "cover.h"
 #include "deck_claims.h"
+#include "deep_granules.h"
 #include "effective_gravity.h"
 #include "grounding.h"
 #include "handover.h"
@@ -47,7 +48,6 @@ struct CullingParts {
   Bed bed;
 
   // what is seen and asked
-  WakeRequests wake;
   BodyMotion motion;
   EffectiveGravity gravity;
   WallSurvey walls;
@@ -60,6 +60,7 @@ struct CullingParts {
   StoreExchange exchange;
   Refill refill;
   ShellClosure closure;
+  DeepGranules deep;
   ContactFreezing freezing;
   Parcels parcels;
   Handover handover;

@@ -13,7 +13,7 @@ int DeckClaims::wake_claimed() {
     groups_of_stored |= groups;
     if (!atoms.groups_may_be_culled(groups)) asking.push_back(bed_.solid.bodies().pose(g.body).to_world(g.position));
   });
-  wake_.ask_many(bed_.ranks, asking, bed_.scales.wake_up(), bed_.solid.locked());
+  bed_.wake.ask_many(bed_.ranks, asking, bed_.scales.wake_up(), bed_.solid.locked());
   return groups_of_stored;
 }
 

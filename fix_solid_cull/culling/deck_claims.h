@@ -4,14 +4,13 @@
 #include <vector>
 
 #include "bed.h"
-#include "wake_requests.h"
 
 namespace solidcull {
 
 /// Looks at the groups of what is culled; nothing comes out of the store for it.
 class DeckClaims {
  public:
-  DeckClaims(const Bed& bed, WakeRequests& wake) : bed_(bed), wake_(wake) {}
+  explicit DeckClaims(const Bed& bed) : bed_(bed) {}
 
   /// What may not be culled any more asks to wake. Returns all engine groups, as bits, of the stored granules of this rank.
   /// Collective.
@@ -19,7 +18,6 @@ class DeckClaims {
 
  private:
   const Bed& bed_;
-  WakeRequests& wake_;
 };
 
 }  // namespace solidcull

@@ -3,14 +3,13 @@
 
 #include "bed.h"
 #include "body_motion.h"
-#include "wake_requests.h"
 
 namespace solidcull {
 
 /// Asks for bodies to wake that are tilted, shaken or let fall. Local.
 class EffectiveGravity {
  public:
-  EffectiveGravity(Bed& bed, const BodyMotion& motion, WakeRequests& wake) : bed_(bed), motion_(motion), wake_(wake) {}
+  EffectiveGravity(Bed& bed, const BodyMotion& motion) : bed_(bed), motion_(motion) {}
 
   /// At each look.
   void watch() {
@@ -42,7 +41,6 @@ class EffectiveGravity {
 
   Bed& bed_;
   const BodyMotion& motion_;
-  WakeRequests& wake_;
   Vec3 gravity_then_ = Vec3::Zero();  // at the last look
   bool turns_ = false;
 };

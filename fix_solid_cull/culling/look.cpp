@@ -23,7 +23,7 @@ void Look::look() {
   p_.gravity.watch();
   std::int64_t in_bodies[2] = {0, static_cast<std::int64_t>(bed_.solid.locked())};
   for (const auto& [number, body] : bed_.solid.bodies().bodies())
-    if (p_.wake.asks_body(bed_.groups.key_of(number))) in_bodies[0] += body.mass.count;
+    if (bed_.wake.asks_body(bed_.groups.key_of(number))) in_bodies[0] += body.mass.count;
   bed_.ranks.sum(in_bodies, 2);
   p_.pacing.see_waking_bodies(in_bodies[0], in_bodies[1], step);
   if (p_.pacing.waits_for_calm(step)) p_.pacing.see_energy(p_.survey.kinetic_energy_of_exterior(), step);
@@ -77,10 +77,6 @@ Proposal Look::survey(bool may_cull, bool any_culled) {
 }
 
 void Look::ground_and_press() {
-  if (!bed_.scales.rigid()) {
-    p_.grounding.share_out_loads();
-    return;
-  }
   p_.grounding.update();
   if (bed_.ranks.any(p_.motion.stale())) {
     bed_.index.index(bed_.atoms);  // they were sorted since membership changed
@@ -89,7 +85,7 @@ void Look::ground_and_press() {
     p_.motion.give_velocities();
   }
   p_.grounding.share_out_loads();
-  const bool asked = p_.closure.ask_to_store(p_.motion.interface_atoms());
+  const bool asked = p_.deep.ask_to_store(p_.motion.interface_atoms());
   if (bed_.ranks.any(p_.grounding.lets_go() || asked)) p_.ask_for_build(bed_.run.step + 1);
 }
 
@@ -117,7 +113,7 @@ void Look::judge(bool may_cull) {
   if (verdict.wait == 0) return;
   p_.pacing.see_wait(verdict.wait, p_.survey.kinetic_energy_of_exterior(), step);
   if (verdict.give_back) {
-    p_.wake.ask_all();
+    bed_.wake.ask_all();
     p_.ask_for_build(step + 1);
   }
   if (verdict.tell)

@@ -26,10 +26,6 @@ void MembershipChange::lock(int i) {
   bed_.shell.lock(atoms, i, bed_.run.step, p_.survey[i].normal_load, bed_.scales.sleeping() && p_.survey.stands_at_wall(i));
   const Survey::Rested rested = p_.survey.note_lock(i);
   if (rested != Survey::Rested::first_time) bed_.solid.count_locked_again(rested == Survey::Rested::moved);
-  if (!bed_.scales.rigid()) {
-    atoms.set_velocity(i, Vec3::Zero());
-    if (bed_.contacts.turn_granules) atoms.set_spin(i, Vec3::Zero());
-  }
   bed_.solid.count_locked();
 }
 
@@ -69,7 +65,6 @@ void MembershipChange::free_what_wakes() {
 bool MembershipChange::still_rests(int i) const {
   const SolidStateLaw& law = bed_.scales.solid_state();
   const Atoms& atoms = bed_.atoms;
-  if (!bed_.scales.rigid()) return law.at_rest(atoms.velocity(i), atoms.spin(i), atoms.radius[i]);
   const AtRest& r = p_.survey[i];
   const double passed = static_cast<double>(bed_.run.step - r.since) * bed_.run.dt;
   return law.went_on(atoms.velocity(i) - r.velocity, r.acceleration_around, r.acceleration_around, passed);
@@ -106,8 +101,18 @@ void MembershipChange::tell_neighbours() {
   changes_.joins.insert(changes_.joins.end(), joins.begin(), joins.end());
 }
 
-// ------------------------------------------------------------------------------------------------------------ out of bodies
+// ------------------------------------------------------------------------------------------------------------ bodies
 
+void MembershipChange::change_bodies() {
+  thaw_and_unlock();
+  freeze_and_lock();
+  bed_.groups.settle();
+  p_.freezing.freeze_between_merged();
+  bed_.solid.turn_frozen();
+  bed_.census.count_bodies();
+}
+
+/// Contacts go back to the engine.
 void MembershipChange::thaw_and_unlock() {
   p_.freezing.thaw(changes_);
   for (const std::int64_t tag : changes_.freed) leave_body(tag);
@@ -132,14 +137,12 @@ void MembershipChange::leave_body(std::int64_t tag) {
   const double radius = bed_.solid.bodies().turning_radius(atoms.radius[i]);
   const MovingGranule given{atoms.mass[i], atoms.radius[i], x, atoms.velocity(i), atoms.spin(i)};
   const double before = bed_.solid.kinetic_energy(body);
-  bed_.solid.unlock(tag, bed_.masses(tag), back && bed_.scales.rigid() ? &given : nullptr);
+  bed_.solid.unlock(tag, bed_.masses(tag), back ? &given : nullptr);
   const double after =
       bed_.solid.kinetic_energy(body) + RigidPart::granule(given.mass, radius, x, given.velocity, given.spin).kinetic_energy();
   bed_.solid.count_restored(after - before);
   bed_.solid.thaw(tag);
 }
-
-// ------------------------------------------------------------------------------------------------------------ into bodies
 
 void MembershipChange::freeze_and_lock() {
   p_.freezing.freeze(changes_, proposal_);
@@ -151,14 +154,8 @@ void MembershipChange::lock_into_body(std::int64_t tag) {
   const int i = bed_.index.at(tag);
   const Atoms& atoms = bed_.atoms;
   const Locked& e = bed_.shell[i];
-  // it has the motion that it had before it was locked; without bodies that move, its momentum goes to the ground
-  const bool rigid = bed_.scales.rigid();
-  const MovingGranule granule{atoms.mass[i],
-                              atoms.radius[i],
-                              atoms.place(i),
-                              rigid ? e.velocity : Vec3(Vec3::Zero()),
-                              rigid ? e.spin : Vec3(Vec3::Zero()),
-                              e.held};
+  // it has the motion that it had before it was locked
+  const MovingGranule granule{atoms.mass[i], atoms.radius[i], atoms.place(i), e.velocity, e.spin, e.held};
   bed_.shell.set_place(i, bed_.solid.lock(tag, granule, bed_.masses.by_tag()));
 }
 
@@ -180,11 +177,6 @@ void MembershipChange::lock_into_bodies() {
     }
   }
   for (const Join& j : changes_.joins) bed_.solid.tie(j.a, j.b, bed_.masses.by_tag());
-}
-
-void MembershipChange::finish_bodies() {
-  p_.freezing.freeze_between_merged();
-  bed_.solid.turn_frozen();
 }
 
 }  // namespace solidcull

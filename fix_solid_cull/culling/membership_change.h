@@ -33,14 +33,11 @@ class MembershipChange {
   /// Granules that wake are unlocked, and come back from the store first; those that were chosen, and still may, are locked;
   /// ranks tell each other. Collective.
   void free_and_lock();
-  /// Contacts of what is free go back to the engine, and the granules leave their bodies, which may come apart. Local.
-  void thaw_and_unlock();
-  /// Contacts of what is locked are frozen, and bodies grow or merge. Local.
-  void freeze_and_lock();
-  /// After the bodies' motions are settled: contacts between merged bodies are frozen, histories turned.
-  /// Collective.
-  void finish_bodies();
+  /// What is free leaves its body, what is locked goes into one, and bodies that come apart, grow or merge are settled; contacts
+  /// thaw and freeze with that. Collective.
+  void change_bodies();
 
+  const FlatMap<char>& freed_anywhere() const { return changes_.freed_anywhere; }
   bool locked_some() const { return !changes_.locked.empty(); }
   std::size_t moved() const { return changes_.freed.size() + changes_.locked.size(); }
 
@@ -51,7 +48,9 @@ class MembershipChange {
   void lock(int i);
   void unlock(int i);
   bool still_rests(int i) const;
+  void thaw_and_unlock();
   void leave_body(std::int64_t tag);
+  void freeze_and_lock();
   void lock_into_body(std::int64_t tag);
   void lock_into_bodies();
 

@@ -254,13 +254,7 @@ void Parcels::take_as_it_was(const Parcel& p) {
 
 void Parcels::end_as_it_was() {
   number_ = {};
-  // with `motion fixed` bodies are never settled: what a rigid one needs is not in such a file
-  const auto& bodies = bed_.solid.bodies().bodies();
-  const bool unsettled = std::any_of(bodies.begin(), bodies.end(), [](const auto& b) { return !(b.second.motion.mass() > 0); });
-  if (bed_.ranks.any(unsettled))
-    bed_.groups.settle();
-  else
-    bed_.groups.group();
+  bed_.groups.group();
 }
 
 // ------------------------------------------------------------------------------------------------------------ taken up anew

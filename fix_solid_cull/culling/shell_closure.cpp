@@ -4,29 +4,15 @@
 #include <cmath>
 
 #include "release.h"
-#include "site_choice.h"
 
 namespace solidcull {
 namespace {
 
-// a shell granule goes to the store when nothing exterior is within this many skins; it is fetched at one skin (no flapping)
-constexpr double store_gap_in_skins = 2.5;
 // an exterior granule that nothing stored was so near to need not be looked at again until it has moved by this many skins: it
 // may have gone as far the other way when the last went to the store, so twice this and one skin is the gap
 constexpr double clear_way_in_skins = 0.75;
 // so many moving frames are compared with a granule one by one, more as one box
 constexpr std::size_t few_frames = 8;
-// interface granules that nothing is near any more go to the store when they are this share of the atoms, or when more changes
-constexpr double store_share = 0.05;
-// they are looked for so often, and when something was locked
-constexpr int builds_between_storing = 4;
-// at a look: for this share of all atoms that might go to the store, at once
-constexpr double worth_of_a_build = 0.05, least_worth = 10;
-// so many granules go to the store before the engine's arrays are cut, which would hold them and the store else
-constexpr std::size_t rows_at_once = 100000;
-// walls are looked at again when a body has moved by this many skins; what is nearer than that and a margin becomes an atom
-constexpr double wall_check_in_skins = 0.25;
-constexpr double wall_gap_in_skins = 1.5;
 
 }  // namespace
 
@@ -38,9 +24,7 @@ void ShellClosure::merged(int gone, int kept, bool same_frame) {
 ShellClosure::Foreign ShellClosure::as_foreign(int i) const {
   const Locked& e = bed_.shell[i];
   const bool in_body = e.in_body();  // else it has just been chosen
-  // bodies that stand do not touch what is stored in each other, but at sites
-  const bool stands = in_body && bed_.solid.stands(e.body) && !bed_.scales.refills();
-  return {bed_.atoms.sphere(i), in_body ? bed_.groups.key_of(e.body) : 0, stands};
+  return {bed_.atoms.sphere(i), in_body ? bed_.groups.key_of(e.body) : 0, in_body && bed_.solid.stands_in_store(e.body)};
 }
 
 void ShellClosure::share() {
@@ -281,7 +265,6 @@ std::size_t ShellClosure::fetch_what_is_near() {
   return near.size();
 }
 
-/// Where everything is to be an atom, whatever is near: `gap` wider than it must be.
 std::vector<Box> ShellClosure::opened(double gap) const {
   const double largest = bed_.solid.store().largest_radius();
   std::vector<Box> all = bed_.insertions.counting(largest + gap);
@@ -308,200 +291,6 @@ std::size_t ShellClosure::fetch_from_outside() {
   });
   for (const std::int64_t tag : leaving) exchange_.bring_back(tag);
   return leaving.size();
-}
-
-// ------------------------------------------------------------------------------------------------------------ into the store
-
-/// Walls do not hinder it from going to the store: there are none, or they and its body stand still, and what they do to it is
-/// known. What has no place presses on no wall: it stays.
-bool ShellClosure::may_leave_its_walls(int i) const {
-  const AtWall& wall = walls_[i];
-  if (!wall.near) return true;
-  if (bed_.scales.refills()) return false;
-  const Locked& e = bed_.shell[i];
-  return bed_.scales.sleeping() && !wall.moving_near && bed_.solid.stands(e.body) && e.came_back != bed_.run.step && !e.fresh &&
-         !new_run_;
-}
-
-/// Engines list what a still mesh is near to for contacts only, not as far as a body may move until somebody looks: of these
-/// atoms those stay whose body may move, and a mesh is within the skin of them.
-void ShellClosure::leave_out_near_meshes(std::vector<int>& atoms) const {
-  std::vector<Sphere> spheres;
-  std::vector<int> of;
-  for (const int i : atoms)
-    if (!bed_.solid.stands(bed_.shell[i].body)) {
-      spheres.push_back(bed_.atoms.sphere(i));
-      of.push_back(i);
-    }
-  if (spheres.empty()) return;
-  SphereCells cells;
-  cells.build(std::move(spheres), 2 * bed_.scales.diameter());
-  const double skin = bed_.run.skin;
-  const Vec3 reach = Vec3::Constant(cells.largest_radius() + skin);
-  std::set<int> near;
-  for (const WallTriangle& t : bed_.walls.triangles())
-    cells.for_each_in_box(t.box.lo - reach, t.box.hi + reach, [&](std::size_t k, const Sphere& s) {
-      if (!near.count(of[k]) && bed_.walls.near(t, s, skin)) near.insert(of[k]);
-      return true;
-    });
-  atoms.erase(std::remove_if(atoms.begin(), atoms.end(), [&](int i) { return near.count(i) != 0; }), atoms.end());
-}
-
-bool ShellClosure::ask_to_store(const std::vector<int>& interface_atoms) {
-  // but for those that something was near to the last time
-  std::size_t may_go = 0;
-  for (const int i : interface_atoms) may_go += may_leave_its_walls(i);
-  const double gain = static_cast<double>(may_go) - static_cast<double>(stay_near_);
-  store_asked_ = gain > std::max(worth_of_a_build * bed_.atoms.owned, least_worth);
-  return store_asked_;
-}
-
-/// What an interface granule may have near it: exterior granules, shells and stored granules of other bodies, insertions.
-class ShellClosure::Surroundings {
- public:
-  explicit Surroundings(const ShellClosure& c) : c_(c), gap_(store_gap_in_skins * c.bed_.run.skin) {
-    std::vector<Sphere> exterior, shells;
-    const bool several = c.bed_.census.several_bodies();
-    const auto sort_in = [&](const Foreign& f) {
-      if (!f.body) {
-        exterior.push_back(f.sphere);
-      } else if (several) {
-        shells.push_back(f.sphere);
-        of_shell_.push_back(f);
-      }
-    };
-    for (int i = 0; i < c.bed_.atoms.owned; ++i) sort_in(c.as_foreign(i));
-    for (const Foreign& f : c.foreign_) sort_in(f);
-    exterior_.build(std::move(exterior), 2 * c.bed_.scales.diameter());
-    shells_.build(std::move(shells), 2 * c.bed_.scales.diameter());
-    if (several) find_others();
-    opened_ = c.opened(gap_);
-  }
-  bool near(int i) const { return near(i, c_.bed_.atoms.sphere(i)); }
-  /// The same if atom i was there.
-  bool near(int i, const Sphere& there) const {
-    return exterior_.any_near(there, gap_) || near_another_body(i, there) || is_open(there.centre);
-  }
-
- private:
-  struct Extent {
-    Vec3 lo, hi;
-  };
-  /// The largest body is everywhere: it asks whether it is near one of the others. Of these there may be thousands of few
-  /// granules.
-  void find_others() {
-    const SolidBodies& bodies = c_.bed_.solid.bodies();
-    std::size_t most = 0;
-    for (const auto& [number, body] : bodies.bodies())
-      if (static_cast<std::size_t>(body.mass.count) > most)
-        most = static_cast<std::size_t>(body.mass.count), largest_ = c_.bed_.groups.key_of(number);
-    const GranuleStore& store = c_.bed_.solid.store();
-    std::vector<Sphere> small;
-    store.for_each_body([&](int body, const Vec3& lo, const Vec3& hi) {
-      if (c_.bed_.groups.key_of(body) == largest_) return;
-      const Pose& pose = bodies.pose(body);
-      const Vec3 half = turned_half_box(pose.turn(), 0.5 * (hi - lo)) + Vec3::Constant(store.largest_radius());
-      const Vec3 middle = pose.to_world(0.5 * (lo + hi));
-      if (half.norm() < c_.bed_.scales.diameter())
-        small.push_back({middle, half.norm()});  // it holds their spheres
-      else
-        others_.push_back({middle - half, middle + half});
-    });
-    small_others_.build(std::move(small), 2 * c_.bed_.scales.diameter());
-  }
-  bool is_open(const Vec3& x) const {
-    return std::any_of(opened_.begin(), opened_.end(), [&](const Box& box) { return box.holds(x); });
-  }
-  bool near_another_body(int i, const Sphere& s) const {
-    if (!c_.bed_.census.several_bodies()) return false;
-    const Foreign self = c_.as_foreign(i);
-    // bodies that both stand still may be as near as they like, but what they do to each other needs two atoms
-    const auto touches = [&](const Sphere& other) {
-      const double reach = c_.bed_.contacts.reach_factor * (s.radius + other.radius);
-      return (c_.bed_.solid.nearest_image(other.centre, s.centre) - s.centre).squaredNorm() < reach * reach;
-    };
-    if (shells_.any_near(s, gap_, [&](std::size_t k) {
-          const Foreign& other = of_shell_[k];
-          return other.body != self.body && (!(self.stands && other.stands) || touches(other.sphere));
-        }))
-      return true;
-    const double reach = s.radius + gap_;
-    const bool images = c_.bed_.ranks.image_shifts().size() > 1;
-    if (self.body == largest_ && !images && !small_others_.any_near(s, gap_) &&
-        std::none_of(others_.begin(), others_.end(), [&](const Extent& e) {
-          return (s.centre.array() > e.lo.array() - reach).all() && (s.centre.array() < e.hi.array() + reach).all();
-        }))
-      return false;
-    bool near = false;
-    c_.bed_.stored.for_each_near(
-        s, gap_,
-        [&](const Resident& g) {
-          near = near || !(self.stands && c_.bed_.solid.stands(g.body)) || touches({c_.bed_.solid.in_world(g), g.radius});
-        },
-        [&](int body) { return self.body && c_.bed_.groups.key_of(body) == self.body; });
-    return near;
-  }
-
-  const ShellClosure& c_;
-  const double gap_;
-  SphereCells exterior_, shells_;
-  std::vector<Foreign> of_shell_;
-  SphereCells small_others_;  // around bodies of few stored granules
-  std::vector<Extent> others_;
-  int largest_ = 0;
-  std::vector<Box> opened_;
-};
-
-std::size_t ShellClosure::store_what_is_deep(bool locked_now, bool membership_changes) {
-  const bool asked = bed_.ranks.any(locked_now || store_asked_);
-  store_asked_ = false;
-  if (!asked && (!bed_.scales.sleeping() || ++builds_without_storing_ < builds_between_storing)) return 0;
-  builds_without_storing_ = 0;
-  // the highest tag must stay an atom: new atoms are numbered from it
-  std::int64_t highest = 0;
-  for (int i = 0; i < bed_.atoms.owned; ++i) highest = std::max<std::int64_t>(highest, bed_.atoms.tag[i]);
-  bed_.ranks.largest(&highest, 1);
-  if (!locked_now && !bed_.scales.sleeping()) return 0;
-
-  const Surroundings surroundings(*this);
-  std::vector<int> deep;
-  stay_near_ = 0;
-  for (int i = bed_.atoms.owned - 1; i >= 0; --i) {
-    if (!bed_.shell[i].locked || !may_leave_its_walls(i) || bed_.atoms.tag[i] == highest) continue;
-    if (surroundings.near(i))
-      ++stay_near_;
-    else
-      deep.push_back(i);
-  }
-  leave_out_near_meshes(deep);
-  // where nothing else changes, a few wait for more
-  if (!membership_changes && static_cast<double>(deep.size()) < store_share * bed_.atoms.owned) return 0;
-  if (bed_.scales.refills()) return put_away_at_sites(deep, surroundings);
-  bed_.solid.expects(deep.size());
-  const int left = bed_.atoms.owned - static_cast<int>(deep.size());
-  for (std::size_t k = 0; k < deep.size(); ++k) {
-    exchange_.put_away(deep[k]);
-    if ((k + 1) % rows_at_once == 0) bed_.memory.give_rows_back(left);
-  }
-  return deep.size();
-}
-
-/// Where no site will do they stay.
-std::size_t ShellClosure::put_away_at_sites(const std::vector<int>& deep, const Surroundings& surroundings) {
-  const double wall_gap = (wall_gap_in_skins + wall_check_in_skins) * bed_.run.skin;
-  const SiteChoice choice(bed_, deep, wall_gap, [&](int i, const Sphere& there) {
-    // where it would lie: through a periodic side others are near than beyond it
-    const Sphere in_box{bed_.run.wrapped(there.centre), there.radius};
-    return bed_.ranks.owns(in_box.centre) && !surroundings.near(i, in_box);
-  });
-  std::size_t went = 0;
-  for (std::size_t k = 0; k < deep.size(); ++k)
-    if (const auto site = choice.of(k)) {
-      exchange_.relocate(deep[k], *site);
-      exchange_.put_away(deep[k]);
-      ++went;
-    }
-  return went;
 }
 
 void ShellClosure::release_memory() { release(foreign_); }

@@ -1,5 +1,5 @@
-// The closed shell (theory.md#closed-shell; invariant I1), both ways: what exterior granules, other bodies or walls come near to
-// becomes an atom again, and shell granules that nothing is near any more go to the store.
+// The closed shell (theory.md#closed-shell; invariant I1): what exterior granules, other bodies or walls come near to becomes an
+// atom again.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,6 @@
 #include "per_granule.h"
 #include "sphere_cells.h"
 #include "store_exchange.h"
-#include "wall_survey.h"
 
 namespace solidcull {
 
@@ -31,7 +30,14 @@ struct Cleared {
 /// Keeps what it knows of who is far from what is stored, so that most of it is not asked again. Writes Cleared.
 class ShellClosure : public BodyFollower {
  public:
-  ShellClosure(Bed& bed, const WallSurvey& walls, StoreExchange& exchange) : bed_(bed), walls_(walls), exchange_(exchange) {}
+  /// An exterior granule or one of a shell, as stored granules of other bodies see it.
+  struct Foreign {
+    Sphere sphere;
+    int body;     // key; 0: exterior
+    bool stands;  // the body does, and what is stored of it
+  };
+
+  ShellClosure(Bed& bed, StoreExchange& exchange) : bed_(bed), exchange_(exchange) {}
 
   PerGranule<Cleared>& rows() { return rows_; }
   void unlocked(int i) { rows_[i].version = Cleared::never; }
@@ -49,6 +55,7 @@ class ShellClosure : public BodyFollower {
   /// A run begins: walls may be others, and stored granules at them are atoms until they are seen to rest.
   void begin_run(bool other_walls) { new_run_ = walls_unfelt_ = other_walls; }
   void end_setup() { new_run_ = false; }
+  bool walls_are_new() const { return new_run_; }
   /// Whether what came out for that has not felt its walls yet: it is about to.
   bool take_walls_unfelt() { return std::exchange(walls_unfelt_, false); }
 
@@ -59,13 +66,18 @@ class ShellClosure : public BodyFollower {
   std::size_t fetch_what_is_near();
   /// What would leave the box becomes an atom, and the engine does with it what it does with any that leaves. Local.
   std::size_t fetch_from_outside();
-  /// What nothing is near any more goes to the store: what was just locked (`locked_now`) and what the looks ask for at once,
-  /// what is left over now and then. `membership_changes`: for other reasons; else a few wait for more. Returns how many went.
-  /// Collective, after share().
-  std::size_t store_what_is_deep(bool locked_now, bool membership_changes);
-
-  /// At a look: whether so many interface granules might go to the store that it is worth a rebuild. Local.
-  bool ask_to_store(const std::vector<int>& interface_atoms);
+  // --- what may be near stored granules, local
+  /// A nearer one brings what is stored out; what goes to the store must be farther from all, so that it does not flap (skins).
+  static constexpr double store_gap_in_skins = 2.5;
+  /// Walls are looked at again when a body has moved by the first; what is nearer to them than the second becomes an atom
+  /// (skins).
+  static constexpr double wall_check_in_skins = 0.25, wall_gap_in_skins = 1.5;
+  /// Atom i of this rank.
+  Foreign as_foreign(int i) const;
+  /// Other ranks' and periodic images', of the last share().
+  const std::vector<Foreign>& foreign() const { return foreign_; }
+  /// Where everything is to be an atom, whatever is near: `gap` wider than it must be (m).
+  std::vector<Box> opened(double gap) const;
 
   void merged(int gone, int kept, bool same_frame) override;
   void grounded_or_let_go(int body) override { seen_walls_.erase(body); }
@@ -75,12 +87,6 @@ class ShellClosure : public BodyFollower {
   void release_memory();
 
  private:
-  /// An exterior granule or one of a shell, as stored granules of other bodies see it.
-  struct Foreign {
-    Sphere sphere;
-    int body;     // key; 0: exterior
-    bool stands;  // the body does
-  };
   struct Visitor {
     Foreign who;
     int atom;    // an exterior granule of this rank, else -1
@@ -88,35 +94,25 @@ class ShellClosure : public BodyFollower {
   };
   struct Frame;
   class Frames;
-  class Surroundings;
   struct SeenWalls {
     Pose pose;                  // of the body, against still walls
     std::vector<Vec3> corners;  // of triangles that can move, seen from the body
   };
 
-  Foreign as_foreign(int i) const;
   bool is_clear(int i) const;
   std::vector<Visitor> visitors(const Frames& frames) const;
-  std::vector<Box> opened(double gap) const;
   void find_near_granules(std::set<std::int64_t>& near);
   void find_near_walls(std::set<std::int64_t>& near);
   void find_near_primitives(const std::vector<int>& frames, std::set<std::int64_t>& near) const;
-  bool may_leave_its_walls(int i) const;
-  void leave_out_near_meshes(std::vector<int>& atoms) const;
-  std::size_t put_away_at_sites(const std::vector<int>& deep, const Surroundings& surroundings);
 
   Bed& bed_;
-  const WallSurvey& walls_;
   StoreExchange& exchange_;
 
   PerGranule<Cleared> rows_;
-  std::vector<Foreign> foreign_;         // other ranks' and periodic images'
+  std::vector<Foreign> foreign_;
   std::map<int, SeenWalls> seen_walls_;  // when frames of the store were last compared with walls
   bool some_made_ = false;               // on this rank
   bool new_run_ = false, walls_unfelt_ = false;
-  bool store_asked_ = false;        // a look saw interface granules that nothing holds any more
-  int builds_without_storing_ = 0;  // since they were last looked for
-  std::size_t stay_near_ = 0;       // interface granules that stayed atoms the last time because something is near
 };
 
 }  // namespace solidcull

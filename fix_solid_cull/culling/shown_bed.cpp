@@ -174,7 +174,7 @@ void ShownBed::hide() {
   for (const int i : guests) atoms.take_out(i);
 
   changed_ = bed_.ranks.any(!changes_.empty());
-  wake_.ask_many(bed_.ranks, asking_, bed_.scales.wake_up(), bed_.solid.locked());
+  bed_.wake.ask_many(bed_.ranks, asking_, bed_.scales.wake_up(), bed_.solid.locked());
   shown_ = false;
   if (granules_.capacity() < worth_freeing) return;
   names_ = {};

@@ -7,7 +7,6 @@
 
 #include "bed.h"
 #include "per_granule.h"
-#include "wake_requests.h"
 
 namespace solidcull {
 
@@ -15,7 +14,7 @@ namespace solidcull {
 /// back at once. What it changed wakes with all that is near, and then has the state that the deck gave it.
 class ShownBed : public FollowsAtoms {
  public:
-  ShownBed(Bed& bed, WakeRequests& wake) : bed_(bed), wake_(wake) {}
+  explicit ShownBed(Bed& bed) : bed_(bed) {}
 
   bool shown() const { return shown_; }
   /// Whether owned atom i is a stored granule that is shown. Local.
@@ -92,7 +91,6 @@ class ShownBed : public FollowsAtoms {
   void give(int i, const Change& change);
 
   Bed& bed_;
-  WakeRequests& wake_;
 
   bool shown_ = false, changed_ = false;
   int groups_of_guests_ = 0;

@@ -12,7 +12,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261128;  // the format's version
+constexpr double file_mark = 20261129;  // the format's version
 /// The numbers in the file's head. The largest stored radius of each type and a check sum follow them.
 enum Header {
   mark,

@@ -1,6 +1,12 @@
 #include "store_exchange.h"
 
 namespace solidcull {
+namespace {
+
+// so many granules go to the store before the engine's arrays are cut, which would hold them and the store else
+constexpr std::size_t rows_at_once = 100000;
+
+}  // namespace
 
 std::size_t StoreExchange::begin_change() {
   if (stored_at_ == never || stored_at_ == bed_.run.step) return 0;
@@ -28,18 +34,7 @@ int StoreExchange::bring_back(std::int64_t tag) {
   if (bed_.contacts.turn_granules) atoms.set_spin(i, body.twist.spin);
   for (StoreFollower* f : followers_) f->came_back(i, g, x);
   bed_.index.set(tag, i);
-  if (bed_.scales.refills()) came_back_.push_back(tag);
   return i;
-}
-
-void StoreExchange::relocate(int i, const Vec3& place) {
-  const Locked& e = bed_.shell[i];
-  Atoms& atoms = bed_.atoms;
-  const Vec3 by = bed_.solid.bodies().pose(e.body).turned_to_world(place - e.place);
-  bed_.solid.count_refilled(-atoms.mass[i] * bed_.run.gravity().dot(by));
-  bed_.solid.relocate(e.body, {atoms.mass[i], e.place, atoms.radius[i], e.held}, place);
-  bed_.shell.set_place(i, {e.body, place});
-  atoms.set_place(i, atoms.place(i) + by);
 }
 
 void StoreExchange::put_away(int i) {
@@ -75,6 +70,16 @@ void StoreExchange::put_away(int i) {
   bed_.index.erase(g.tag);
   atoms.take_out(i);
   if (i < atoms.owned) bed_.index.set(atoms.tag[i], i);
+}
+
+std::size_t StoreExchange::put_away(const std::vector<int>& atoms) {
+  bed_.solid.expects(atoms.size());
+  const int left = bed_.atoms.owned - static_cast<int>(atoms.size());
+  for (std::size_t k = 0; k < atoms.size(); ++k) {
+    put_away(atoms[k]);
+    if ((k + 1) % rows_at_once == 0) bed_.memory.give_rows_back(left);
+  }
+  return atoms.size();
 }
 
 }  // namespace solidcull

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "bed.h"
@@ -27,13 +26,10 @@ class StoreExchange {
 
   /// Interface granule i goes to the store; the last owned atom takes its index.
   void put_away(int i);
+  /// All of these, which stand from the last atom to the first.
+  std::size_t put_away(const std::vector<int>& atoms);
   /// The granule is an interface granule again, where its body is; returns its index.
   int bring_back(std::int64_t tag);
-  /// Interface granule i stands elsewhere in its body from here on: place in the body's frame (m). It may have been unlocked in
-  /// this change.
-  void relocate(int i, const Vec3& place);
-  /// With `restore refill`: tags of what has come back since the last call.
-  std::vector<std::int64_t> take_what_came_back() { return std::exchange(came_back_, {}); }
   /// All engine groups, as bits, that a granule that went in is in; of what came out again too, until they are counted anew.
   /// Local.
   int stored_groups() const { return stored_groups_; }
@@ -50,7 +46,6 @@ class StoreExchange {
 
   Bed& bed_;
   std::vector<StoreFollower*> followers_;
-  std::vector<std::int64_t> came_back_;
   int stored_groups_ = 0;
   std::int64_t stored_at_ = never;  // step in which granules last went into the store
   std::vector<int> motion_words_;   // of a record: what is of no worth once that step has passed

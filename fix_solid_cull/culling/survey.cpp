@@ -78,12 +78,11 @@ std::vector<Vec3> Survey::accelerations() const {
   std::vector<Vec3> a(static_cast<std::size_t>(atoms.owned + atoms.ghosts), Vec3::Zero());
   for (int i = 0; i < atoms.owned; ++i)
     if (!bed_.shell[i].locked) a[i] = atoms.force(i) / atoms.mass[i];
-  if (bed_.scales.rigid())
-    for (std::size_t k = 0; k < motion_.interface_atoms().size(); ++k) {
-      const ActiveBody& b = motion_.active()[motion_.slot(k)];
-      const int i = motion_.interface_atoms()[k];
-      if (!b.stands) a[i] = b.body->motion.acceleration(b.body->pose.to_world(bed_.shell[i].place), b.force, b.torque);
-    }
+  for (std::size_t k = 0; k < motion_.interface_atoms().size(); ++k) {
+    const ActiveBody& b = motion_.active()[motion_.slot(k)];
+    const int i = motion_.interface_atoms()[k];
+    if (!b.stands) a[i] = b.body->motion.acceleration(b.body->pose.to_world(bed_.shell[i].place), b.force, b.torque);
+  }
   if (!bed_.ranks.has_neighbours()) return a;
   struct Row {
     Triple at;
@@ -180,10 +179,6 @@ Awake Survey::see(int i, const Seen& seen, const SolidStateLaw& law) {
   if (!atoms.may_be_culled(i)) return Awake::held;
   if (!(seen.touching[i] || at_wall) || !(loaded || !seen.drifting[i])) return Awake::alone;
   if (seen.moving[i] || leaves_wall) return Awake::moving;
-  if (!bed_.scales.rigid()) {
-    if (!law.at_rest(v, atoms.spin(i), atoms.radius[i])) return Awake::moving;
-    return law.balanced(seen.acceleration[i], Vec3::Zero()) ? Awake::settling : Awake::unsteady;
-  }
   const Vec3 frame = frame_of(i, seen);
   if (!law.balanced(seen.acceleration[i], frame)) return Awake::unsteady;
   AtRest& r = rows_[i];

@@ -9,7 +9,6 @@
 #include "bed.h"
 #include "per_granule.h"
 #include "store_exchange.h"
-#include "wake_requests.h"
 
 namespace solidcull {
 
@@ -40,7 +39,7 @@ struct AtWall {
 /// Local.
 class WallSurvey : public StoreFollower {
  public:
-  WallSurvey(const Bed& bed, WakeRequests& wake) : bed_(bed), wake_(wake) {}
+  explicit WallSurvey(const Bed& bed) : bed_(bed) {}
 
   const AtWall& operator[](int i) const { return rows_[i]; }
   PerGranule<AtWall>& rows() { return rows_; }
@@ -71,7 +70,6 @@ class WallSurvey : public StoreFollower {
   }
 
   const Bed& bed_;
-  WakeRequests& wake_;
   PerGranule<AtWall> rows_;
   std::vector<double> fingerprint_;
   std::vector<std::string> names_then_;

@@ -36,7 +36,6 @@ class Scales {
   const SolidStateLaw& solid_state() const { return solid_state_; }
   const WakeUpLaw& wake_up() const { return wake_up_; }
 
-  bool rigid() const { return settings_.motion == Motion::rigid; }
   bool sleeping() const { return settings_.exterior == Exterior::sleep; }
   bool compact() const { return settings_.store == Store::compact; }
   /// No place of a stored granule is kept: what comes back is put into a new packing.

@@ -87,16 +87,6 @@ const std::map<std::string, Reader>& readers() {
          s.carve_radius = v.number(wanted, 0, false);
          s.carve_cap = v.number(wanted, 1, true);
        }},
-      {"motion",
-       [](Values& v, Settings& s) {
-         v.one_of("'rigid' or 'fixed'",
-                  {{"rigid", [&] { s.motion = Motion::rigid; }}, {"fixed", [&] { s.motion = Motion::fixed; }}});
-       }},
-      {"walls",
-       [](Values& v, Settings& s) {
-         v.one_of("'closed' or 'surface'",
-                  {{"closed", [&] { s.walls = WallCover::closed; }}, {"surface", [&] { s.walls = WallCover::surface; }}});
-       }},
       {"store",
        [](Values& v, Settings& s) {
          v.one_of("'exact', 'compact' or 'none'", {{"exact", [&] { s.store = Store::exact; }},
@@ -128,6 +118,15 @@ const std::map<std::string, Reader>& readers() {
   return table;
 }
 
+/// Keywords of 0.1, and what to do without them.
+const std::map<std::string, std::string>& gone() {
+  static const std::map<std::string, std::string> table = {
+      {"motion", "bodies that walls hold stand still by themselves"},
+      {"walls", "walls that stand still always count as cover"},
+  };
+  return table;
+}
+
 }  // namespace
 
 std::vector<std::string> setting_keywords() {
@@ -141,6 +140,8 @@ Settings parse_settings(const std::vector<std::string>& words) {
   s.depth = -1;
   for (std::size_t at = 0; at < words.size();) {
     const auto reader = readers().find(words[at]);
+    if (const auto old = gone().find(words[at]); old != gone().end())
+      throw InputError("keyword '" + words[at] + "' is no more: leave it and its value out; " + old->second);
     if (reader == readers().end()) {
       std::string known;
       for (const std::string& k : setting_keywords()) known += (known.empty() ? "" : ", ") + k;

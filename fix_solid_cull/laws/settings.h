@@ -7,8 +7,6 @@
 namespace solidcull {
 
 enum class Exterior { live, sleep };
-enum class Motion { rigid, fixed };
-enum class WallCover { closed, surface };
 enum class Store { exact, compact, none };
 enum class Restore { exact, refill };
 enum class ReportLength { brief, full };
@@ -29,8 +27,6 @@ struct Settings {
   double tolerance_relative = 0;  ///< R of the wake-up law, in normal loads at locking
   double carve_radius = 2.0;      ///< r0, in mean diameters
   double carve_cap = 4.0;         ///< largest growth of r0
-  Motion motion = Motion::rigid;
-  WallCover walls = WallCover::closed;
   Store store = Store::exact;
   Restore restore = Restore::exact;
   double voxel = 0.5;  ///< in mean diameters

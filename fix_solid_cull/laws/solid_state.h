@@ -49,10 +49,6 @@ struct SolidStateLaw {
   bool spins_beside(const MovingSphere& a, const MovingSphere& b) const {
     return (b.velocity - a.velocity).squaredNorm() < drift_share * drift_share * speed * speed && !quiet_contact(a, b);
   }
-  /// A fixed body rests in the world: granule at rest in translation and at its surface.
-  bool at_rest(const Vec3& velocity, const Vec3& spin, double radius) const {
-    return velocity.squaredNorm() < speed * speed && spin.squaredNorm() * radius * radius < speed * speed;
-  }
   /// Since calm began it has kept its velocity, or changed it as its neighbours' acceleration of then makes it: nothing has
   /// struck it, and the frame in which it rests is not shaken.
   bool went_on(const Vec3& velocity_change, const Vec3& acceleration_then, const Vec3& acceleration_now, double seconds) const {

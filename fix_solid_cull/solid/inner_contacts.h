@@ -71,6 +71,9 @@ class InnerContacts {
   virtual void unpack(const Resident& g, ContactList& contacts) = 0;
   /// The histories inside this body turn; places are still those of before.
   virtual void turn(int body, const Eigen::Matrix3d& by) = 0;
+  virtual bool keeps_histories() const { return true; }
+  /// What it can keep may never stay in the graph.
+  virtual bool packs_always() const { return false; }
 
  protected:
   std::size_t width() const { return flips_.size(); }

@@ -15,6 +15,7 @@ class RoundedContacts : public InnerContacts {
   bool history(const Resident& g, std::int64_t partner, double* history) const override;
   void unpack(const Resident& g, ContactList& contacts) override;
   void turn(int body, const Eigen::Matrix3d& by) override;
+  bool packs_always() const override { return true; }
 
  private:
   static constexpr std::size_t nowhere = SIZE_MAX;

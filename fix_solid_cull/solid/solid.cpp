@@ -4,15 +4,13 @@
 #include <cmath>
 #include <set>
 
-#include "contacts_in_store.h"
 #include "exact_contacts.h"
 #include "rounded_contacts.h"
+#include "site_contacts.h"
 
 namespace solidcull {
 namespace {
 
-// what is no farther apart in a store that keeps sites hangs together there
-constexpr double gap_between_sites = 0.3;  // of the radii's sum
 // how far a free site is looked for: at first, and in the end (diameters)
 constexpr double near_site = 1.5, far_site = 50;
 constexpr double at_a_site = 1e-6;  // radii
@@ -26,30 +24,25 @@ constexpr double pack_share = 0.5;
 
 void Solid::open_store() {
   const double cell = 2 * scales_.diameter();
+  using Precision = GranuleStore::Precision;
   if (scales_.refills()) {
     sites_ = std::make_unique<Sites>(scales_.diameter());
     store_ = std::make_unique<GranuleStore>(cell, *sites_);
+    inner_ = std::make_unique<SiteContacts>(*store_, bodies_);
+  } else if (scales_.compact()) {
+    store_ = std::make_unique<GranuleStore>(cell, Precision::rounded);
+    inner_ = std::make_unique<RoundedContacts>(*store_, bodies_);
   } else {
-    store_ = std::make_unique<GranuleStore>(
-        cell, scales_.compact() ? GranuleStore::Precision::rounded : GranuleStore::Precision::exact);
+    store_ = std::make_unique<GranuleStore>(cell, Precision::exact);
+    inner_ = std::make_unique<ExactContacts>(*store_, bodies_);
   }
   bodies_.set_elsewhere([this](std::int64_t tag) { return store_->body_of(tag); });
-  if (scales_.refills()) {
-    contacts_.set_elsewhere([this](std::int64_t tag, std::vector<std::int64_t>& partners) {
-      contacts_in_store(*store_, bodies_, tag, gap_between_sites, partners);
-    });
-    return;
-  }
-  if (scales_.compact())
-    inner_ = std::make_unique<RoundedContacts>(*store_, bodies_);
-  else
-    inner_ = std::make_unique<ExactContacts>(*store_, bodies_);
   inner_->set_layout(contacts_.layout(), contacts_.vectors());
   contacts_.set_elsewhere([this](std::int64_t tag, std::vector<std::int64_t>& partners) { inner_->find(tag, partners); });
 }
 
 bool Solid::set_histories(const std::vector<bool>& flips, const std::vector<int>& vectors) {
-  const bool stored = inner_ && store_->size() > 0;
+  const bool stored = inner_ && inner_->keeps_histories() && store_->size() > 0;
   if ((contacts_.size() > 0 || stored) && flips != contacts_.layout()) return false;
   if (stored && vectors != contacts_.vectors()) return false;
   contacts_.set_layout(flips);
@@ -106,11 +99,11 @@ void Solid::adopt_swallowed() {
     const Pose &from = gone.second, &to = bodies_.pose(body);
     const bool same = from == to;
     const Eigen::Matrix3d turn = to.turn().transpose() * from.turn();
-    if (inner_ && !same) inner_->turn(gone.first, turn);
+    if (!same) inner_->turn(gone.first, turn);
     if (store_->holds(gone.first) && store_->frame_of(gone.first) != GranuleStore::shared_frame)
       ++standing_version_;  // its granules may stand from now on
     std::vector<std::int64_t> moved;
-    if (scales_.refills() && !same) {
+    if (sites_ && !same) {
       store_->for_each_of_body(gone.first, [&](const Resident& g) { moved.push_back(g.tag); });
       for (const std::int64_t tag : moved)
         contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { contacts_.add(tag, partner, nullptr); });
@@ -123,14 +116,14 @@ void Solid::adopt_swallowed() {
       g.position = to.to_frame(from.to_world(g.position));
       g.load_change = turn * g.load_change;
       turn_contacts(g.tag, turn);
-      if (scales_.refills()) {
+      if (sites_) {
         const Vec3 site = free_site(body, g.position, g.radius);
         bodies_.relocate(body, {g.mass, g.position, g.radius, g.held}, site);
         g.position = site;
       }
       changed(body, {g.position, g.radius});
     });
-    for (const std::int64_t tag : moved) drop_what_sites_tell(tag);
+    for (const std::int64_t tag : moved) drop_what_is_known(tag);
     wall_loads_.merge(gone.first, body);
     tell([&](BodyFollower& f) { f.merged(gone.first, body, same); });
     if (scales_.sleeping()) find_grid(body);
@@ -198,7 +191,6 @@ void Solid::leave_rank(std::int64_t tag) {
 /// What the store keeps of the contacts of g leaves the graph: for its row's tail.
 InnerContacts::Tail Solid::take_from_graph(const StoredGranule& g, bool all_given) {
   InnerContacts::Tail tail;
-  if (!inner_) return tail;
   ContactList contacts(contacts_.width());
   contacts_.for_each_here(g.tag, [&](std::int64_t partner, const double* history) {
     if (const auto stored = store_->find(partner)) contacts.add(partner, history, &*stored);
@@ -210,25 +202,22 @@ InnerContacts::Tail Solid::take_from_graph(const StoredGranule& g, bool all_give
   return tail;
 }
 
-/// The store says itself which body the granule is in. With `store none` no history is kept, and what is near is as good as
-/// touching.
+/// The store says itself which body the granule is in.
 void Solid::entered_store(std::int64_t tag) {
   bodies_.leave(tag);
-  if (!scales_.refills()) return;
-  contacts_.forget_histories(tag);
-  drop_what_sites_tell(tag);
+  if (!inner_->keeps_histories()) contacts_.forget_histories(tag);
 }
 
 void Solid::enter_store(std::int64_t tag) {
-  if (scales_.compact() || is_large(store_->size())) {
+  if (inner_->packs_always() || is_large(store_->size())) {
     const InnerContacts::Tail tail = take_from_graph(store_->get(tag), true);
     if (!tail.empty()) store_->set_tail(*store_->find(tag), tail);
   }
   entered_store(tag);
 }
 
-/// What touched and has sites farther apart still hangs together: that stays in the graph.
-void Solid::drop_what_sites_tell(std::int64_t tag) {
+/// Those of its contacts in the graph that are known from where granules lie.
+void Solid::drop_what_is_known(std::int64_t tag) {
   std::vector<std::int64_t> told;
   contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { told.push_back(partner); });
   contacts_.drop(tag, [&](std::int64_t partner) { return std::find(told.begin(), told.end(), partner) != told.end(); });
@@ -237,10 +226,6 @@ void Solid::drop_what_sites_tell(std::int64_t tag) {
 void Solid::leaves_store(std::int64_t tag) {
   const Resident g = *store_->find(tag);
   bodies_.take_in(tag, g.body);
-  if (!inner_) {
-    contacts_.for_each_elsewhere(tag, [&](std::int64_t partner) { contacts_.add(tag, partner, nullptr); });
-    return;
-  }
   ContactList contacts(contacts_.width());
   inner_->unpack(g, contacts);
   for (std::size_t k = 0; k < contacts.size(); ++k) contacts_.add(tag, contacts.partner(k), contacts.history(k));
@@ -257,7 +242,7 @@ Vec3 Solid::free_site(int body, const Vec3& place, double radius) const {
 }
 
 StoredGranule Solid::as_stored(const StoredGranule& g) {
-  if (scales_.refills()) {
+  if (sites_) {
     StoredGranule at_site = g;
     at_site.position = free_site(g.body, g.position, g.radius);
     relocate(g.body, {g.mass, g.position, g.radius, g.held}, at_site.position);
@@ -272,7 +257,7 @@ StoredGranule Solid::as_stored(const StoredGranule& g) {
 void Solid::expects(std::size_t granules) {
   const std::size_t stored = store_->size();
   const bool many = pack_from_ == 0 || static_cast<double>(granules) >= pack_share * static_cast<double>(stored);
-  packs_ = scales_.compact() || (many && is_large(stored + granules));
+  packs_ = inner_->packs_always() || (many && is_large(stored + granules));
 }
 
 void Solid::put_away(const StoredGranule& g, const std::vector<double>& record, const std::vector<int>& transient,
@@ -302,8 +287,7 @@ void Solid::add_stored(const StoredGranule& g, const double* record, int length)
 
 void Solid::add_stored(const StoredGranule& g, const double* record, int length, const ContactList& contacts) {
   InnerContacts::Tail tail;
-  std::vector<char> kept(contacts.size());
-  if (inner_) kept = inner_->pack({g.position, g.radius, g.tag, g.body}, contacts, true, tail);
+  const std::vector<char> kept = inner_->pack({g.position, g.radius, g.tag, g.body}, contacts, true, tail);
   store_->add(g, record, length, {}, tail);
   ledger_.stored(g);
   know_radius(g.type, g.radius);

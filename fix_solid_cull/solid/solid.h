@@ -77,7 +77,9 @@ class Solid {
   std::size_t locked() const { return bodies_.locked() + store_->size(); }
   bool exists(int body) const { return bodies_.bodies().count(body) != 0; }
   /// Its granules at still walls may be stored.
-  bool stands(int body) const { return !scales_.rigid() || bodies_.body(body).grounded; }
+  bool stands(int body) const { return bodies_.body(body).grounded; }
+  /// It stands, and so do its stored granules where they were: what they and others that stand do to each other is known.
+  bool stands_in_store(int body) const { return stands(body) && !sites_; }
   /// A body is in balance when what is left over is less than this share of its weight.
   static constexpr double balance_share = 0.002;
   /// The walls' frozen loads on this rank's stored granules of the body are in balance with its weight.
@@ -99,7 +101,7 @@ class Solid {
   int standing_version() const { return standing_version_; }
   /// History of a contact between two stored granules that is not in the graph, as g sees it; false if it has none.
   bool inner_history(const Resident& g, std::int64_t partner, double* history) const {
-    return inner_ && inner_->history(g, partner, history);
+    return inner_->history(g, partner, history);
   }
 
   // --- bodies
@@ -205,7 +207,7 @@ class Solid {
   InnerContacts::Tail take_from_graph(const StoredGranule& g, bool all_given);
   void leaves_store(std::int64_t tag);
   void entered_store(std::int64_t tag);
-  void drop_what_sites_tell(std::int64_t tag);
+  void drop_what_is_known(std::int64_t tag);
   void changed(int body, const Sphere& granule) {
     tell([&](BodyFollower& f) { f.granule_changed(body, granule); });
   }
@@ -220,10 +222,10 @@ class Solid {
   std::unique_ptr<GranuleStore> store_;
   FrozenContacts contacts_;
   SolidBodies bodies_;
-  std::unique_ptr<InnerContacts> inner_;  // but for `store none`
-  std::size_t pack_from_ = 15000;         // granules: three megabytes of contacts
-  bool packs_ = true;                     // what is put away now
-  FrozenWallLoads wall_loads_;            // of stored granules
+  std::unique_ptr<InnerContacts> inner_;
+  std::size_t pack_from_ = 15000;  // granules: three megabytes of contacts
+  bool packs_ = true;              // what is put away now
+  FrozenWallLoads wall_loads_;     // of stored granules
   Ledger ledger_;
   std::vector<double> largest_radius_by_type_;
   int standing_version_ = 0;

@@ -233,13 +233,13 @@ class Grammar(MoreEvents):
             words += [f"every {rng.choice((10, 10, 25))}", f"calm {rng.choice((1, 1, 2))}", f"speed {rng.choice((0.5, 0.5, 2))}",
                       f"tolerance {rng.choice(('30 0', '30 0', '300 0', '10 0.1'))}"]
             offers = [(0.7, ["exterior sleep", "exterior live depth 1", "exterior live depth 0.5 voxel 0.25", "exterior live depth 1.5"]), (0.15, ["carve 1 1", "carve 3 2"]),
-                      (0.15, ["motion fixed"]), (0.2, ["walls surface"]), (0.25, ["store compact"]), (0.05, ["bed 200 bed.*.vtp"]),
+                      (0.15, ["restore exact"]), (0.2, ["report full"]), (0.25, ["store compact"]), (0.05, ["bed 200 bed.*.vtp"]),
                       (0.05, ["mesh 200 mesh.*.stl"])]
             return words + [rng.choice(choices) for p, choices in offers if rng.random() < p]
         offers = [(0.7, ["exterior sleep", "exterior sleep", "exterior live"]), (0.6, ["every 10", "every 10", "every 20", "every 50"]),
                   (0.5, ["calm 1", "calm 2", "calm 3"]), (0.7, ["speed 0.05", "speed 0.5", "speed 0.5", "speed 0.002"]),
                   (0.5, ["tolerance 30 0", "tolerance 30 0", "tolerance 1 0", "tolerance 3 0.1", "tolerance 300 0"]), (0.4, ["depth 1", "depth 1.5", "depth 3"]),
-                  (0.15, ["carve 1 1", "carve 3 2"]), (0.15, ["motion fixed"]), (0.2, ["walls surface"]), (0.25, ["store compact"]),
+                  (0.15, ["carve 1 1", "carve 3 2"]), (0.15, ["restore exact"]), (0.2, ["report full"]), (0.25, ["store compact"]),
                   (0.1, ["voxel 0.4"]), (0.05, ["bed 200 bed.*.vtp"]), (0.05, ["mesh 200 mesh.*.stl"])]
         for p, choices in offers:
             if rng.random() < p:

@@ -94,9 +94,6 @@ def make_cases():
             stopped = {**way, "steps": 300}
             add(f"resume-fall-{exterior}-{store}", ranks, [("fall.in", stopped), ("resume_fall.in", way)], "mass.in",
                 {"interior": 300, "carried": 300, "restored": 200})
-        fixed = {"exterior": "sleep", "more": "motion fixed"}
-        add("fixed-sleep-exact", ranks, [("impact.in", fixed)], "bed.in", {**BED, **GROUNDED})
-        add("surface-live-exact", ranks, [("impact.in", {"more": "walls surface"})], "bed.in", BED)
         for scene in ("impact", "fall", "split"):
             deck, bed, keywords, demands = SCENES[scene]
             files = {"exterior": "sleep", "files": 100, "more": f"{keywords} mesh 300 mesh.*.stl mesh 300 mesh.*.vdb"}

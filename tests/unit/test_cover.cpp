@@ -60,22 +60,21 @@ TEST(Cover, the_pores_of_a_packing_are_no_surface_but_a_hole_for_a_granule_and_m
   EXPECT_FALSE(cube.deep(2, 2, 3));
 }
 
-TEST(Cover, a_wall_closes_the_surface_unless_the_user_says_that_it_is_one) {
-  for (const bool closed : {true, false})
-    for (const bool moving : {true, false}) {
-      SmallDeck deck = empty_space();
-      deck.planes = {SmallDeck::ground(0)};
-      deck.planes[0].moving = moving;
-      Settings settings = living_settings();
-      settings.walls = closed ? WallCover::closed : WallCover::surface;
-      Cube cube(deck, settings, Vec3(0, 0, r));
-      cube.parts.cover.close_behind_walls(cube.world.walls.contacts(), [](int) { return true; });
-      cube.parts.cover.draw();
-      EXPECT_EQ(cube.deep(3, 3, 0), closed) << moving;
-      EXPECT_EQ(cube.deep(3, 3, 1), closed) << moving;
-      EXPECT_FALSE(cube.deep(0, 3, 0));  // its side is open
-      EXPECT_FALSE(cube.deep(3, 3, 6));
-    }
+TEST(Cover, a_wall_closes_the_surface) {
+  for (const bool moving : {true, false}) {
+    SmallDeck deck = empty_space();
+    deck.planes = {SmallDeck::ground(0)};
+    deck.planes[0].moving = moving;
+    Cube cube(deck, living_settings(), Vec3(0, 0, r));
+    cube.parts.cover.draw();
+    EXPECT_FALSE(cube.deep(3, 3, 0)) << moving;
+    cube.parts.cover.close_behind_walls(cube.world.walls.contacts(), [](int) { return true; });
+    cube.parts.cover.draw();
+    EXPECT_TRUE(cube.deep(3, 3, 0)) << moving;
+    EXPECT_TRUE(cube.deep(3, 3, 1)) << moving;
+    EXPECT_FALSE(cube.deep(0, 3, 0));  // its side is open
+    EXPECT_FALSE(cube.deep(3, 3, 6));
+  }
 }
 
 TEST(Cover, a_moving_wall_closes_only_where_granules_rest_at_it_and_only_while_it_is_there) {
@@ -158,19 +157,19 @@ struct Culled : Cube {
 
 TEST(Cover, an_interface_granule_that_loses_its_cover_asks_to_wake) {
   Culled cube;
-  EXPECT_FALSE(cube.parts.wake.any_here());
+  EXPECT_FALSE(cube.parts.bed.wake.any_here());
   cube.remove_above(6);  // one layer of two and a half: half a diameter of the cover is gone, and that is borne
   cube.parts.motion.begin_lists();
   cube.parts.motion.refresh();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
-  const std::size_t after_one = cube.parts.wake.take(cube.world.ranks, cube.parts.bed.scales.wake_up()).balls.size();
+  const std::size_t after_one = cube.parts.bed.wake.take(cube.world.ranks, cube.parts.bed.scales.wake_up()).balls.size();
   cube.remove_above(5);  // the second: half a diameter is left
   cube.parts.motion.begin_lists();
   cube.parts.motion.refresh();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
-  const Wakes wakes = cube.parts.wake.take(cube.world.ranks, cube.parts.bed.scales.wake_up());
+  const Wakes wakes = cube.parts.bed.wake.take(cube.world.ranks, cube.parts.bed.scales.wake_up());
   EXPECT_LE(after_one, 9u);  // at most the topmost nine
   // now all nine of them, whoever else
   for (int i = 2; i < 5; ++i)
@@ -190,7 +189,7 @@ TEST(Cover, storing_and_fetching_leaves_the_surface_as_it_is) {
   cube.parts.reneighbour();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
-  EXPECT_FALSE(cube.parts.wake.any_here());
+  EXPECT_FALSE(cube.parts.bed.wake.any_here());
   EXPECT_TRUE(cube.deep(3, 3, 3));
 }
 
@@ -205,7 +204,7 @@ TEST(Cover, a_mass_that_moves_as_one_keeps_its_surface_and_the_observer_rides_on
   cube.parts.motion.refresh();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
-  EXPECT_FALSE(cube.parts.wake.any_here());
+  EXPECT_FALSE(cube.parts.bed.wake.any_here());
   EXPECT_TRUE(cube.deep(2, 2, 2));
   EXPECT_FALSE(cube.deep(1, 3, 3));
   EXPECT_LT((cube.parts.cover.observer().origin() - before.origin() - shift).norm(), 1e-12);

@@ -40,7 +40,7 @@ struct Block {
     world.run.step += window;
     watch();
   }
-  bool asks() const { return parts.wake.asks_body(key); }
+  bool asks() const { return parts.bed.wake.asks_body(key); }
   void tilt(double degrees) { world.deck.gravity = 9.81 * Vec3(std::sin(degrees * degree), 0, -std::cos(degrees * degree)); }
 
   SmallWorld world;
@@ -155,19 +155,6 @@ TEST(EffectiveGravity, a_deck_that_has_changed_gravity_between_runs_is_seen_at_o
     EXPECT_EQ(block.asks(), changed);
     EXPECT_EQ(block.parts.gravity.at_last_look(), block.world.deck.gravity);
   }
-}
-
-TEST(EffectiveGravity, fixed_bodies_feel_gravity_alone) {
-  Settings settings = sleeping_settings();
-  settings.motion = Motion::fixed;
-  Block block(7, SmallDeck(), settings);
-  block.watch();
-  block.tilt(0.13);
-  block.watch();
-  EXPECT_FALSE(block.asks());
-  block.tilt(0.16);
-  block.watch();
-  EXPECT_TRUE(block.asks());
 }
 
 }  // namespace

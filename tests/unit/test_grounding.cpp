@@ -286,7 +286,7 @@ TEST(WallSurvey, interface_granules_wake_whose_wall_has_gone) {
       bed.world.deck.planes.clear();
       bed.parts.walls.update(bed.world.walls.contacts(), new_run);
       // within a run only a wall that can move may leave; between runs a deck may take any away
-      EXPECT_EQ(bed.parts.wake.any_here(), moving || new_run) << moving << new_run;
+      EXPECT_EQ(bed.parts.bed.wake.any_here(), moving || new_run) << moving << new_run;
     }
 }
 
@@ -295,7 +295,7 @@ TEST(WallSurvey, a_wall_that_stays_wakes_nobody) {
   bed.lock({1, 2, 3});
   bed.parts.walls.update(bed.world.walls.contacts(), true);
   bed.parts.walls.update(bed.world.walls.contacts(), false);
-  EXPECT_FALSE(bed.parts.wake.any_here());
+  EXPECT_FALSE(bed.parts.bed.wake.any_here());
   EXPECT_FALSE(bed.parts.walls.take_gone());  // the first time: nothing to compare with
   bed.world.deck.planes.push_back(SmallDeck::ground(-1, "another"));
   EXPECT_FALSE(bed.parts.walls.take_gone());

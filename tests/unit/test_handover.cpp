@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <set>
+#include <type_traits>
 
 #include "input_error.h"
 #include "world_parts.h"
@@ -23,6 +26,17 @@ SmallDeck ranks_along_x(int ranks) {
   return deck;
 }
 
+/// Those of a stored granule's numbers that mean the same on each rank, in each frame, and nothing to the rest of the culling:
+/// all that a new one is until it is used. Calls visit(number).
+template <class Visit>
+void each_free_number(StoredGranule& g, Visit visit) {
+  g.each_number([&](auto& x) {
+    const void* const used[] = {&g.position[0],    &g.position[1],    &g.position[2],    &g.radius, &g.mass, &g.layout,
+                                &g.load_change[0], &g.load_change[1], &g.load_change[2], &g.type,   &g.held};
+    if (std::find(std::begin(used), std::end(used), static_cast<const void*>(&x)) == std::end(used)) visit(x);
+  });
+}
+
 /// What all ranks hold together.
 struct Whole {
   std::mutex mutex;
@@ -30,6 +44,7 @@ struct Whole {
   double mass = 0, colour = 0;
   Vec3 momentum = Vec3::Zero(), turning = Vec3::Zero();
   std::map<int, Vec3> places;                                      // by tag
+  std::map<int, std::vector<double>> numbers;                      // of stored granules
   std::map<std::pair<std::int64_t, std::int64_t>, Vec3> contacts;  // as the lower tag sees it, world frame
   std::set<int> keys;                                              // of bodies
   std::vector<int> tags_by_rank[4];
@@ -61,6 +76,8 @@ struct Whole {
       std::vector<double> record;
       parts.bed.solid.store().record(g.tag, record);
       colour += record.back();
+      StoredGranule stored = parts.bed.solid.store().get(g.tag);
+      each_free_number(stored, [&](auto& x) { numbers[static_cast<int>(g.tag)].push_back(static_cast<double>(x)); });
     });
     const auto contact = [&](std::int64_t low, std::int64_t high, const double* h) {
       const int body = bodies.body_of(low) ? bodies.body_of(low) : bodies.body_of(high);
@@ -90,6 +107,7 @@ void expect_alike(const Whole& a, const Whole& b) {
   EXPECT_EQ(a.keys.size(), b.keys.size());
   ASSERT_EQ(a.places.size(), b.places.size());
   for (const auto& [tag, x] : b.places) EXPECT_LT((a.places.at(tag) - x).norm(), 1e-12) << tag;
+  EXPECT_EQ(a.numbers, b.numbers);
   ASSERT_EQ(a.contacts.size(), b.contacts.size());
   for (const auto& [pair, h] : b.contacts)
     EXPECT_LT((a.contacts.at(pair) - h).norm(), 1e-12 * h.norm()) << pair.first << ' ' << pair.second;
@@ -108,7 +126,21 @@ struct Block {
     world.reneighbour();  // whoever has crossed a border by now does so as an exterior granule
     parts.lock(tags);
     parts.put_away({2, 3, 4, 5, 8, 9, 10, 11, 14, 15});
+    mark_stored();
     parts.reneighbour();
+  }
+  /// Each free number of each stored granule is another one.
+  void mark_stored() {
+    std::vector<std::int64_t> stored;
+    parts.bed.solid.store().for_each([&](const Resident& g) { stored.push_back(g.tag); });
+    for (const std::int64_t tag : stored) {
+      std::vector<double> record;
+      StoredGranule g = parts.bed.solid.bring_back(tag, record);
+      int n = 0;
+      each_free_number(g, [&](auto& x) { x = static_cast<std::decay_t<decltype(x)>>(100 * tag + ++n); });
+      EXPECT_GE(n, 3);
+      parts.bed.solid.put_away(g, record, {}, {});
+    }
   }
   void shift(const Vec3& by) {
     for (auto& [number, body] : parts.bed.solid.bodies_in_motion()) {

@@ -47,8 +47,6 @@ void expect_same(const Settings& a, const Settings& b) {
   EXPECT_EQ(a.tolerance_relative, b.tolerance_relative);
   EXPECT_EQ(a.carve_radius, b.carve_radius);
   EXPECT_EQ(a.carve_cap, b.carve_cap);
-  EXPECT_EQ(a.motion, b.motion);
-  EXPECT_EQ(a.walls, b.walls);
   EXPECT_EQ(a.store, b.store);
   EXPECT_EQ(a.restore, b.restore);
   EXPECT_EQ(a.voxel, b.voxel);
@@ -78,8 +76,6 @@ TEST(Settings, without_keywords_are_the_defaults) {
   EXPECT_EQ(s.tolerance_relative, 0.0);
   EXPECT_EQ(s.carve_radius, 2.0);
   EXPECT_EQ(s.carve_cap, 4.0);
-  EXPECT_EQ(s.motion, Motion::rigid);
-  EXPECT_EQ(s.walls, WallCover::closed);
   EXPECT_EQ(s.store, Store::exact);
   EXPECT_EQ(s.restore, Restore::exact);
   EXPECT_EQ(s.voxel, 0.5);
@@ -99,25 +95,17 @@ TEST(Settings, every_keyword_is_parsed) {
   due.tolerance_relative = 0.1;
   due.carve_radius = 1.5;
   due.carve_cap = 6;
-  due.motion = Motion::fixed;
-  due.walls = WallCover::surface;
   due.voxel = 0.25;
   due.report = ReportLength::full;
   due.meshes = {{100, "out/mesh.*.vdb"}};
   due.beds = {{200, "bed.vtp"}};
   const std::string line =
-      "every 40 depth 3.5 exterior live speed 1e-3 calm 5 tolerance 0.5 0.1 carve 1.5 6 motion fixed walls surface store exact "
+      "every 40 depth 3.5 exterior live speed 1e-3 calm 5 tolerance 0.5 0.1 carve 1.5 6 store exact "
       "restore exact voxel 0.25 report full mesh 100 out/mesh.*.vdb bed 200 bed.vtp";
   expect_same(parsed(line), due);
   std::set<std::string> named;
   for (const std::string& w : words(line)) named.insert(w);
   for (const std::string& k : setting_keywords()) EXPECT_TRUE(named.count(k)) << "keyword " << k << " is in no test";
-}
-
-TEST(Settings, bodies_move_unless_they_are_fixed) {
-  EXPECT_EQ(parsed("motion rigid").motion, Motion::rigid);
-  EXPECT_EQ(parsed("motion fixed").motion, Motion::fixed);
-  EXPECT_EQ(parsed("motion fixed motion rigid").motion, Motion::rigid);
 }
 
 TEST(Settings, what_is_not_stored_is_refilled) {
@@ -153,10 +141,6 @@ TEST(Settings, the_limits_themselves_are_allowed) {
                            "depth 4 voxel 2",
                            "depth 1 voxel 0.5",
                            "speed 1e-9",
-                           "walls closed",
-                           "walls surface",
-                           "motion rigid",
-                           "motion fixed",
                            "report short",
                            "report full",
                            "mesh 1 a.vdb",
@@ -232,10 +216,8 @@ const Refusal refusals[] = {
     {"carve 2",
      "keyword 'carve' ends too early: give two numbers C CAP: radius in mean diameters, more than 0; growth, 1 or more"},
 
-    {"motion floating", "keyword 'motion' has the value 'floating': give 'rigid' or 'fixed'"},
-    {"motion", "keyword 'motion' ends too early: give 'rigid' or 'fixed'"},
-    {"walls open", "keyword 'walls' has the value 'open': give 'closed' or 'surface'"},
-    {"walls", "keyword 'walls' ends too early: give 'closed' or 'surface'"},
+    {"motion fixed", "keyword 'motion' is no more: leave it and its value out; bodies that walls hold stand still by themselves"},
+    {"walls", "keyword 'walls' is no more: leave it and its value out; walls that stand still always count as cover"},
     {"store some", "keyword 'store' has the value 'some': give 'exact', 'compact' or 'none'"},
     {"store", "keyword 'store' ends too early: give 'exact', 'compact' or 'none'"},
     {"store none",
@@ -271,12 +253,12 @@ const Refusal refusals[] = {
     {"depth 0.8 exterior live", "voxel 0.5 is too coarse for depth 0.8: choose voxel <= depth/2"},
 
     {"deptth 2",
-     "unknown keyword 'deptth': choose from bed, calm, carve, depth, every, exterior, mesh, motion, report, restore, speed, "
+     "unknown keyword 'deptth': choose from bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, "
      "store, "
-     "tolerance, voxel, walls"},
+     "tolerance, voxel"},
     {"calm 3 4",
-     "unknown keyword '4': choose from bed, calm, carve, depth, every, exterior, mesh, motion, report, restore, speed, store, "
-     "tolerance, voxel, walls"},
+     "unknown keyword '4': choose from bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, store, "
+     "tolerance, voxel"},
 };
 
 INSTANTIATE_TEST_SUITE_P(Refusals, SettingsRefuse, testing::ValuesIn(refusals), [](const auto& info) {

@@ -33,7 +33,8 @@ struct Row {
     parts.bed.index.index(world.atoms);
     parts.bed.census.count_bodies();
     parts.closure.share();
-    return parts.closure.store_what_is_deep(true, true);
+    return parts.deep.store(true, true,
+                            [&](const std::vector<int>& atoms, const auto&) { return parts.exchange.put_away(atoms); });
   }
   Tags stored() const {
     Tags all;
@@ -366,11 +367,11 @@ TEST(ShellClosure, a_box_that_follows_the_granules_holds_what_is_stored) {
   EXPECT_EQ(box.hi[1], 0.25);
 }
 
-TEST(ShellClosure, a_look_asks_for_a_rebuild_when_enough_might_go) {
+TEST(DeepGranules, a_look_asks_for_a_rebuild_when_enough_might_go) {
   for (const int granules : {10, 11}) {
     Row row(empty_space(), granules);
     row.parts.motion.refresh();
-    EXPECT_EQ(row.parts.closure.ask_to_store(row.parts.motion.interface_atoms()), granules > 10) << granules;
+    EXPECT_EQ(row.parts.deep.ask_to_store(row.parts.motion.interface_atoms()), granules > 10) << granules;
   }
 }
 

@@ -83,18 +83,9 @@ TEST(SolidStateLaw, a_contact_is_quiet_below_the_speed) {
   EXPECT_FALSE(law.quiet_contact(a, at_speed(0.0101)));
 }
 
-TEST(SolidStateLaw, a_falling_pair_is_quiet_but_not_at_rest) {
+TEST(SolidStateLaw, a_falling_pair_is_quiet) {
   const MovingSphere a{Vec3::Zero(), Vec3(0, 0, -9), Vec3::Zero(), 1.0}, b{Vec3(2, 0, 0), Vec3(0, 0, -9), Vec3::Zero(), 1.0};
   EXPECT_TRUE(law.quiet_contact(a, b));
-  EXPECT_FALSE(law.at_rest(a.velocity, a.spin, a.radius));
-}
-
-TEST(SolidStateLaw, rest_counts_translation_and_the_speed_of_the_surface) {
-  const double r = 0.002;
-  EXPECT_TRUE(law.at_rest(Vec3(0, 0.0099, 0), Vec3::Zero(), r));
-  EXPECT_FALSE(law.at_rest(Vec3(0, 0.0101, 0), Vec3::Zero(), r));
-  EXPECT_TRUE(law.at_rest(Vec3::Zero(), Vec3(4.9, 0, 0), r));  // 0.01 / 0.002 = 5 rad/s
-  EXPECT_FALSE(law.at_rest(Vec3::Zero(), Vec3(5.1, 0, 0), r));
 }
 
 TEST(SolidStateLaw, balance_is_measured_in_granule_weights) {

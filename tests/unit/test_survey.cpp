@@ -194,19 +194,6 @@ TEST(Survey, a_mass_that_is_struck_as_a_whole_begins_anew) {
   EXPECT_EQ(bed.calm(2), 1);
 }
 
-TEST(Survey, with_fixed_bodies_only_what_rests_in_the_world_is_solid) {
-  Settings settings = sleeping_settings();
-  settings.motion = Motion::fixed;
-  Bed bed(settings);
-  bed.row(1, 3, Vec3::Zero());
-  bed.begin();
-  for (int i = 0; i < 3; ++i) bed.world.atoms.set_velocity(i, Vec3(0, 0, 1.1 * bed.speed));
-  for (int n = 0; n < looks_to_calm; ++n) EXPECT_EQ(bed.look(), 0);
-  for (int i = 0; i < 3; ++i) bed.world.atoms.set_velocity(i, Vec3(0, 0, 0.9 * bed.speed));
-  for (int n = 0; n < looks_to_calm; ++n) bed.look();
-  EXPECT_EQ(bed.chosen(), (Tags{1, 2, 3}));
-}
-
 // ------------------------------------------------------------------------------------------------------------ walls
 
 struct OnGround : Bed {

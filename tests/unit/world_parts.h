@@ -45,17 +45,13 @@ struct WorldParts : CullingParts {
     bed.solid.pack_contacts_from(0);
   }
 
-  /// One membership change as Culling makes it, but for what goes to the store and comes out by the shell's closure. Collective.
+  /// The first half of a membership change: nothing goes to the store or comes out by the shell's closure. Collective.
   void change(Wakes wakes, Proposal proposal) {
     exchange.begin_change();
     MembershipChange c(bed, for_change(), std::move(wakes), std::move(proposal));
     bed.index.index(world.atoms);
     c.free_and_lock();
-    c.thaw_and_unlock();
-    c.freeze_and_lock();
-    bed.groups.settle();
-    c.finish_bodies();
-    bed.census.count_bodies();
+    c.change_bodies();
     bed.census.count_stored();
     bed.label_bodies();
     motion.begin_lists();

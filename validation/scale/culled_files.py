@@ -14,7 +14,7 @@ from solidcull_runs.errors import RunError
 BEGINS, ENDS = b"SDCULLB1", b"SDCULLE1"
 PART, INTERFACE, INTERIOR = 1, 2, 3                      # kinds of chunks
 ONE, MOST, FEW, LIKE, NARROW, PLAIN = range(6)           # ways to keep a column
-MARK = 20261128.0                                        # of the fix's numbers
+MARK = 20261129.0                                        # of the fix's numbers
 (STATE_MARK, STATE_SIZE, STATE_INTERIOR, STATE_DIAMETER) = range(1, 5)
 STATE_COUNTERS, STATE_WIDTH, STATE_RANKS, STATE_STEP, STATE_NO_PLACES, STATE_SECTION, STATE_IDENTITY, STATE_TYPES = 9, 15, 16, 17, 18, 19, 20, 22
 HIGH, LOW = 0xffffffff00000000, 0xffffffff

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <utility>
 
 #include "near_walls.h"
+#include "shell_closure.h"
+#include "site_choice.h"
 #include "sphere_relaxation.h"
 
 namespace solidcull {
@@ -22,8 +24,52 @@ constexpr double longest_way = 4, next_place = 3;  // diameters
 
 }  // namespace
 
+void Refill::begin_change() { newcomers_.clear(); }
+
+void Refill::came_back(int i, const StoredGranule&, const Vec3&) {
+  if (acts()) came_back_.push_back(bed_.atoms.tag[i]);
+}
+
+bool Refill::fetch(const std::vector<std::int64_t>& stored) {
+  for (const std::int64_t tag : stored) exchange_.bring_back(tag);
+  return !stored.empty();
+}
+
+// ------------------------------------------------------------------------------------------------------------ into the store
+
+/// It may have been unlocked in this change.
+void Refill::relocate(int i, const Vec3& place) {
+  const Locked& e = bed_.shell[i];
+  Atoms& atoms = bed_.atoms;
+  const Vec3 by = bed_.solid.bodies().pose(e.body).turned_to_world(place - e.place);
+  bed_.solid.count_refilled(-atoms.mass[i] * bed_.run.gravity().dot(by));
+  bed_.solid.relocate(e.body, {atoms.mass[i], e.place, atoms.radius[i], e.held}, place);
+  bed_.shell.set_place(i, {e.body, place});
+  atoms.set_place(i, atoms.place(i) + by);
+}
+
+std::size_t Refill::put_away(const std::vector<int>& atoms, const std::function<bool(int, const Sphere&)>& near) {
+  const double wall_gap = (ShellClosure::wall_gap_in_skins + ShellClosure::wall_check_in_skins) * bed_.run.skin;
+  const SiteChoice choice(bed_, atoms, wall_gap, [&](int i, const Sphere& there) {
+    // where it would lie: through a periodic side others are near than beyond it
+    const Sphere in_box{bed_.run.wrapped(there.centre), there.radius};
+    return bed_.ranks.owns(in_box.centre) && !near(i, in_box);
+  });
+  std::size_t went = 0;
+  for (std::size_t k = 0; k < atoms.size(); ++k)
+    if (const auto site = choice.of(k)) {
+      relocate(atoms[k], *site);
+      exchange_.put_away(atoms[k]);
+      ++went;
+    }
+  return went;
+}
+
+// ------------------------------------------------------------------------------------------------------------ and back
+
 bool Refill::pack() {
-  const std::vector<std::int64_t> came = exchange_.take_what_came_back();
+  if (!acts()) return false;
+  const std::vector<std::int64_t> came = std::exchange(came_back_, {});
   if (!bed_.ranks.any(!came.empty())) return false;
   newcomers_.insert(newcomers_.end(), came.begin(), came.end());
   std::sort(newcomers_.begin(), newcomers_.end());
@@ -113,9 +159,37 @@ void Refill::place(const std::vector<int>& atoms, const std::vector<Sphere>& now
   for (std::size_t k = 0; k < atoms.size(); ++k) {
     const int i = atoms[k];
     const Vec3 by = now[k].centre - bed_.atoms.place(i);
-    if (!by.isZero(0))
-      exchange_.relocate(i, bed_.shell[i].place + bed_.solid.bodies().pose(bed_.shell[i].body).turned_to_frame(by));
+    if (!by.isZero(0)) relocate(i, bed_.shell[i].place + bed_.solid.bodies().pose(bed_.shell[i].body).turned_to_frame(by));
   }
+}
+
+// ------------------------------------------------------------------------------------------------------------ energy
+
+void Refill::note_freed(const FlatMap<char>& freed) {
+  if (!acts()) return;
+  freed_ = freed;
+  kept_.clear();
+  const HistoryRows rows = bed_.contacts.histories();
+  for (int i = 0; i < bed_.atoms.owned; ++i)
+    rows.for_each_partner(i, [&](std::int64_t partner, const double*) {
+      if (freed.contains(bed_.atoms.tag[i]) || freed.contains(partner)) kept_.insert(ordered(bed_.atoms.tag[i], partner));
+    });
+}
+
+/// Half of force times overlap: exact for Hooke's law, a quarter too much for Hertz's.
+void Refill::count_energy_of_new_contacts() {
+  if (freed_.empty()) return;
+  const Atoms& atoms = bed_.atoms;
+  double energy = 0;
+  bed_.contacts.neighbours().for_each_pair(atoms.owned, [&](int i, int j, int k) {
+    if (!freed_.contains(atoms.tag[i]) && !freed_.contains(atoms.tag[j])) return;
+    const double overlap = atoms.radius[i] + atoms.radius[j] - (atoms.place(i) - atoms.place(j)).norm();
+    if (overlap <= 0 || kept_.count(ordered(atoms.tag[i], atoms.tag[j]))) return;
+    const double share = j < atoms.owned ? 1.0 : 0.5;  // another rank sees it, too
+    energy += share * 0.5 * bed_.contacts.force_on_first(i, k).norm() * overlap;
+  });
+  bed_.solid.count_refilled(energy);
+  freed_.clear();
 }
 
 }  // namespace solidcull

@@ -1,0 +1,45 @@
+// Interface granules that nothing is near any more go to the store (theory.md#closed-shell).
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "bed.h"
+#include "shell_closure.h"
+#include "wall_survey.h"
+
+namespace solidcull {
+
+/// Finds them: what a change has just locked, what a look asks for, and what is left over now and then.
+class DeepGranules {
+ public:
+  /// Whether something would be near atom i if it was there, in the world.
+  using Near = std::function<bool(int i, const Sphere& there)>;
+  /// Takes what may go, from the last atom to the first; returns how many went.
+  using PutAway = std::function<std::size_t(const std::vector<int>& atoms, const Near& near)>;
+
+  DeepGranules(const Bed& bed, const WallSurvey& walls, const ShellClosure& closure)
+      : bed_(bed), walls_(walls), closure_(closure) {}
+
+  /// At a look: whether so many interface granules might go that it is worth a rebuild. Local.
+  bool ask_to_store(const std::vector<int>& interface_atoms);
+  /// `locked_now`: something was locked in this change. `membership_changes`: atoms come and go for other reasons too; else a few
+  /// wait for more. Returns how many went. Collective, after ShellClosure::share().
+  std::size_t store(bool locked_now, bool membership_changes, const PutAway& put_away);
+
+ private:
+  class Surroundings;
+
+  bool may_leave_its_walls(int i) const;
+  void leave_out_near_meshes(std::vector<int>& atoms) const;
+
+  const Bed& bed_;
+  const WallSurvey& walls_;
+  const ShellClosure& closure_;
+  bool asked_ = false;              // a look saw interface granules that nothing holds any more
+  int builds_without_storing_ = 0;  // since they were last looked for
+  std::size_t stay_near_ = 0;       // interface granules that stayed atoms the last time because something is near
+};
+
+}  // namespace solidcull
