@@ -94,6 +94,7 @@ def make_cases():
             stopped = {**way, "steps": 300}
             add(f"resume-fall-{exterior}-{store}", ranks, [("fall.in", stopped), ("resume_fall.in", way)], "mass.in",
                 {"interior": 300, "carried": 300, "restored": 200})
+        add("none-live", ranks, [("impact.in", {"store": "none", "more": "restore refill"})], "bed.in", {"interior": 500, "carves": 50})
         for scene in ("impact", "fall", "split"):
             deck, bed, keywords, demands = SCENES[scene]
             files = {"exterior": "sleep", "files": 100, "more": f"{keywords} mesh 300 mesh.*.stl mesh 300 mesh.*.vdb"}
