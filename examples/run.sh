@@ -9,5 +9,5 @@ if [ ! -f "$here/$name/example.py" ]; then
   echo "run.sh: no example '$name'; there is: $(cd "$here" && ls -d */ | tr -d / | tr '\n' ' ')" >&2
   exit 2
 fi
-"$here/../scripts/prepare.sh"
+"$here/../scripts/prepare.sh" liggghts-solidcull
 exec /usr/bin/python3 "$here/$name/example.py" "${@:2}"
