@@ -48,12 +48,6 @@ StoredGranule Bed::interface_granule(int i) const {
   return g;
 }
 
-bool Bed::strays() const {
-  for (int i = 0; i < atoms.owned; ++i)
-    if (ranks.strays(atoms.place(i))) return true;
-  return false;
-}
-
 void Bed::label_bodies() {
   for (int i = 0; i < atoms.owned; ++i) shell.label(i, shell[i].locked ? groups.key_of(shell[i].body) : 0);
 }

@@ -24,12 +24,6 @@ struct Bed : BedState, BodyFollower {
   void adopt_places();
   /// Interface granule i as its body knows it, with what it has in the shell. Local.
   StoredGranule interface_granule(int i) const;
-  /// Whether an atom is far from this rank, see Ranks::strays(). Local.
-  bool strays() const;
-  /// All ranks learn whether that is so on any. Collective.
-  void look_for_strays() const {
-    if (ranks.count > 1) ranks.rows_may_stray(ranks.any(strays()));
-  }
   /// Each atom is labelled with its body's number over all ranks. Local.
   void label_bodies();
 

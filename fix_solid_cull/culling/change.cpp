@@ -26,9 +26,8 @@ void Change::make(Look& look, Phase phase) {
   check_numbers(bed_.atoms);  // before they are sorted into cells, here and by the engine
   if (!bed_.solid.has_store()) return;
   const auto timed = p_.report.time(Part::membership);
-  follow_box();
-  bed_.look_for_strays();
   meet_new_granules(phase);
+  follow_box();
   // another fix may have deleted granules in this hook
   if (phase == Phase::stepping && bed_.census.something_locked()) forget_lost();
   bed_.memory.freed(p_.exchange.begin_change());

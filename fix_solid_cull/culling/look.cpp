@@ -19,16 +19,13 @@ void Look::look() {
   const auto timed = p_.report.time(Part::look);
   const std::int64_t step = bed_.run.step;
   check_numbers(bed_.atoms);
+  const bool any_culled = bed_.ranks.any(!p_.motion.interface_atoms().empty() || bed_.solid.store().size() > 0);
   p_.gravity.watch();
-  std::int64_t sums[4] = {0, static_cast<std::int64_t>(bed_.solid.locked()),
-                          !p_.motion.interface_atoms().empty() || bed_.solid.store().size() > 0, bed_.strays()};
-  auto& [waking, locked, culled, strays] = sums;
+  std::int64_t in_bodies[2] = {0, static_cast<std::int64_t>(bed_.solid.locked())};
   for (const auto& [number, body] : bed_.solid.bodies().bodies())
-    if (bed_.wake.asks_body(bed_.groups.key_of(number))) waking += body.mass.count;
-  bed_.ranks.sum(sums, 4);
-  bed_.ranks.rows_may_stray(strays > 0);
-  const bool any_culled = culled > 0;
-  p_.pacing.see_waking_bodies(waking, locked, step);
+    if (bed_.wake.asks_body(bed_.groups.key_of(number))) in_bodies[0] += body.mass.count;
+  bed_.ranks.sum(in_bodies, 2);
+  p_.pacing.see_waking_bodies(in_bodies[0], in_bodies[1], step);
   if (p_.pacing.waits_for_calm(step)) p_.pacing.see_energy(p_.survey.kinetic_energy_of_exterior(), step);
   const bool may_cull = p_.pacing.may_cull(step) && !p_.gravity.turns();
   if (may_cull || any_culled) see_walls(false);
@@ -41,7 +38,6 @@ void Look::look() {
 void Look::look_at_once() {
   const auto timed = p_.report.time(Part::look);
   check_numbers(bed_.atoms);
-  bed_.look_for_strays();
   if (!p_.gravity.turns()) chosen_ = survey(true, false);
   p_.pacing.has_looked_at_once();
   if (bed_.ranks.any(!chosen_.chosen.empty())) p_.ask_for_build(bed_.run.step);

@@ -243,12 +243,8 @@ class Ranks {
   virtual bool has_neighbours() const = 0;
   /// A box that follows the granules does so now, as the engine will before it sends them to other ranks. Collective.
   virtual void follow_box() {}
-  /// Subdomains may have moved: reads them anew. Local.
+  /// Subdomains may have moved: reads them anew, on all ranks. Local.
   virtual void update() = 0;
-  /// Whether the place is farther outside of this rank's subdomain than engines let atoms go between two neighbour builds.
-  virtual bool strays(const Vec3& /*place*/) const { return false; }
-  /// Whether any rank has rows for exchange() whose places stray. Holds until it is said anew, the same on all ranks. Local.
-  virtual void rows_may_stray(bool /*anywhere*/) {}
   virtual bool subdomain_changed() const = 0;
   /// Whether this rank's subdomain holds the place (periodic images wrapped).
   virtual bool owns(const Vec3& place) const = 0;

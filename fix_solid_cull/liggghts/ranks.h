@@ -24,8 +24,6 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
   bool has_neighbours() const override { return has_neighbours_; }
   void follow_box() override;
   void update() override;
-  bool strays(const Vec3& place) const override;
-  void rows_may_stray(bool anywhere) override;
   bool subdomain_changed() const override;
   bool owns(const Vec3& place) const override;
   const std::vector<Vec3>& image_shifts() const override { return shifts_; }
@@ -40,14 +38,14 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
   };
   std::array<double, 6> own_borders() const;  // lo, hi
   RankGrid grid() const;
-  const std::vector<Partner>& partners(double width) const;
+  const std::vector<Partner>& partners(double reach) const;
 
   std::array<double, 6> own_{};
   RankGrid grid_;
   bool known_ = false;  // both, as they were at the last update()
   std::vector<Vec3> shifts_{Vec3::Zero()};
-  bool has_neighbours_ = false, rows_stray_ = false;
-  mutable std::map<double, std::vector<Partner>> partners_;  // by width, in the order of ranks
+  bool has_neighbours_ = false;
+  mutable std::map<double, std::vector<Partner>> partners_;  // by reach, in the order of ranks
 };
 
 }  // namespace solidcull
