@@ -239,7 +239,7 @@ class Restart(Case):
                     out = folder / pattern
                     self.accepted(BLOCK + f"write_restart {out}\n" + BALL + f"{CULL_BLOCK}\nrun {BEFORE}\nwrite_restart {out}\n", ranks=written)
                     files = sorted(f.name for f in folder.iterdir())
-                    self.assertFalse([f for f in files if f.endswith(".part")], files)
+                    self.assertFalse([f for f in files if f.startswith(".part")], files)
                     self.assertEqual(len(files), (1 + written if "%" in pattern else 1) * (2 if "*" in pattern else 1), files)
                     end, straight = self.end_of(resumed(folder / named, f"{CULL_BLOCK}\nrun {AFTER}\n", END), read), self.straight()
                     self.assertEqual(sorted(end), sorted(straight))
@@ -252,14 +252,14 @@ class Restart(Case):
         self.accepted(BLOCK + BALL + f"{CULL_BLOCK}\nrestart 50 {one} {two}\nrun {BEFORE}\n")
         for file in (one, two):
             self.section(file.read_bytes())
-        self.assertFalse(list(self.place.glob("*.part")))
+        self.assertFalse(list(self.place.glob(".part*")))
         self.accepted(resumed(one, f"{CULL_BLOCK}\nrun 10\n", END.replace("custom end", f"custom {self.place / 'end'}")))
 
     def test_a_file_that_cannot_be_written(self):
         """On a device that is full, nothing is left that looks like a restart file."""
         if not Path("/dev/full").exists():
             self.skipTest("no /dev/full")
-        part = self.place / "full.restart.part"
+        part = self.place / ".part.full.restart"
         part.symlink_to("/dev/full")
         try:
             self.refused_by_fix(BLOCK + BALL + f"{CULL_BLOCK}\nrun {BEFORE}\nwrite_restart {self.place / 'full.restart'}\n",
@@ -267,6 +267,14 @@ class Restart(Case):
             self.assertFalse((self.place / "full.restart").exists())
         finally:
             part.unlink(missing_ok=True)
+
+    def test_a_run_that_was_killed_while_it_wrote(self):
+        """What it left is no file that a pattern finds: the newest whole one is read."""
+        with tempfile.TemporaryDirectory(dir=self.place) as folder:
+            folder = Path(folder)
+            self.copy(folder / "k.50.restart", self.file(1).read_bytes())
+            (folder / ".part.k.150.restart").write_bytes(self.file(1).read_bytes()[:1000])
+            self.accepted(resumed(folder / "k.*.restart", f"{CULL_BLOCK}\nrun 10\n", END.replace("custom end", f"custom {folder / 'end'}")))
 
     def test_what_reads_the_file_without_the_fix_sees_its_atoms(self):
         """As any LIGGGHTS does: it does not look behind the atoms."""

@@ -9,6 +9,7 @@
 
 #include "input_error.h"
 #include "numbers.h"
+#include "uneven_ranks.h"
 
 namespace solidcull {
 namespace {
@@ -108,6 +109,13 @@ void Culling::set_up_atoms() {
   p_.closure.begin_run(other_walls);
   change();
   p_.closure.end_setup();
+  tell_uneven_ranks();
+}
+
+void Culling::tell_uneven_ranks() {
+  const std::string line = uneven_ranks(bed_);
+  if (!line.empty() && told_.empty()) bed_.run.say(line);
+  told_ = line;
 }
 
 void Culling::end_setup() {

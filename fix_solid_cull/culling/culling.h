@@ -97,6 +97,7 @@ class Culling {
   void refuse_what_lies_too_far() const;
   void take_loads();
   void store_what_feels_walls();
+  void tell_uneven_ranks();
   void collect_wakes();
   void open_for_insertion(std::int64_t step);
 
@@ -107,6 +108,7 @@ class Culling {
   BetweenRuns between_{p_, change_, look_};
   Phase phase_ = Phase::between_runs;
   bool loads_are_none_ = false;  // nothing was culled when they were taken last
+  std::string told_;             // the last line about ranks
 };
 
 }  // namespace solidcull

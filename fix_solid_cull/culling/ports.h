@@ -243,7 +243,7 @@ class Ranks {
   virtual bool has_neighbours() const = 0;
   /// A box that follows the granules does so now, as the engine will before it sends them to other ranks. Collective.
   virtual void follow_box() {}
-  /// Subdomains may have moved: reads them anew. Collective.
+  /// Subdomains may have moved: reads them anew, on all ranks. Local.
   virtual void update() = 0;
   virtual bool subdomain_changed() const = 0;
   /// Whether this rank's subdomain holds the place (periodic images wrapped).

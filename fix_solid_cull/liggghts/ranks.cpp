@@ -5,12 +5,16 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "comm.h"
 #include "domain.h"
+#include "neighbor.h"
 
 namespace solidcull {
 namespace {
+
+constexpr int exchange_tag = 7311;  // LIGGGHTS's own messages are done when ours begin, and have other tags
 
 /// MPI counts rows, so that messages may be larger than 2 GiB.
 class RowType {
@@ -71,10 +75,41 @@ void EngineRanks::follow_box() {
   if (count > 1 && domain->nonperiodic == shrink_wrapped) domain->reset_box();
 }
 
+/// As every rank knows it: no message is needed.
+RankGrid EngineRanks::grid() const {
+  constexpr double no_border = std::numeric_limits<double>::infinity();
+  const double* const splits[3] = {comm->xsplit, comm->ysplit, comm->zsplit};
+  RankGrid g;
+  for (int d = 0; d < 3; ++d) {
+    const int cells = comm->procgrid[d];
+    const bool periodic = domain->boundary[d][0] == 0;
+    for (int c = 0; c < cells; ++c) g.cuts[d].push_back(domain->boxlo[d] + splits[d][c] * domain->prd[d]);
+    g.cuts[d].push_back(domain->boxhi[d]);
+    if (periodic) {
+      g.periods[d] = domain->prd[d];
+    } else {
+      g.cuts[d].front() = -no_border;
+      g.cuts[d].back() = no_border;
+    }
+  }
+  return g;
+}
+
+auto EngineRanks::partners(double reach) const -> const std::vector<Partner>& {
+  const auto known = partners_.find(reach);
+  if (known != partners_.end()) return known->second;
+  std::vector<Partner> found;
+  for (const RankGrid::Partner& p : grid_.around({comm->myloc[0], comm->myloc[1], comm->myloc[2]}, reach))
+    found.push_back({p, comm->grid2proc[p.cell[0]][p.cell[1]][p.cell[2]]});
+  std::sort(found.begin(), found.end(), [](const Partner& a, const Partner& b) { return a.rank < b.rank; });
+  return partners_[reach] = std::move(found);
+}
+
 void EngineRanks::update() {
-  const std::array<double, 6> mine = own_borders();
-  boxes_.resize(6 * static_cast<std::size_t>(count));
-  MPI_Allgather(mine.data(), 6, MPI_DOUBLE, boxes_.data(), 6, MPI_DOUBLE, world);
+  own_ = own_borders();
+  grid_ = grid();
+  known_ = true;
+  partners_.clear();
 
   shifts_.assign(1, Vec3::Zero());
   const bool periodic[3] = {domain->xperiodic != 0, domain->yperiodic != 0, domain->zperiodic != 0};
@@ -87,11 +122,7 @@ void EngineRanks::update() {
   has_neighbours_ = count > 1 || shifts_.size() > 1;
 }
 
-bool EngineRanks::subdomain_changed() const {
-  if (boxes_.empty()) return true;
-  const std::array<double, 6> now = own_borders();
-  return !std::equal(now.begin(), now.end(), &boxes_[6 * static_cast<std::size_t>(me)]);
-}
+bool EngineRanks::subdomain_changed() const { return !known_ || own_borders() != own_; }
 
 bool EngineRanks::owns(const Vec3& place) const {
   double x[3];
@@ -106,38 +137,77 @@ bool EngineRanks::owns(const Vec3& place) const {
 
 void EngineRanks::exchange_bytes(const void* rows, std::size_t n, std::size_t bytes, double width, const Room& room) const {
   const char* const from = static_cast<const char*>(rows);
-  std::vector<char> out;
-  std::vector<int> send(count), receive(count), send_at(count), receive_at(count);
-  for (int rank = 0; rank < count; ++rank) {
-    const double* box = &boxes_[6 * static_cast<std::size_t>(rank)];
-    send_at[rank] = static_cast<int>(out.size() / bytes);
-    for (const Vec3& shift : shifts_) {
-      if (rank == me && shift.isZero(0)) continue;
-      for (std::size_t r = 0; r < n; ++r) {
-        Triple at;
-        std::memcpy(at.data(), from + r * bytes, sizeof at);
+  // most rows are farther than the width from all borders of this subdomain
+  const double rounding = 1e-6 * width;
+  const auto is_near_a_border = [&](const Triple& at) {
+    for (int d = 0; d < 3; ++d)
+      if (at[d] <= own_[d] + width + rounding || at[d] >= own_[3 + d] - width - rounding) return true;
+    return false;
+  };
+  // atoms hardly leave their subdomain between two builds; what comes out of a store, or a deck has moved, may be anywhere
+  const double slack = neighbor->cutneighmax;
+  const auto far_out = [&](const Triple& at) {
+    for (int d = 0; d < 3; ++d)
+      if (at[d] < own_[d] - slack || at[d] > own_[3 + d] + slack) return true;
+    return false;
+  };
+  bool strays = false;
+  struct Row {
+    std::size_t number;
+    Triple at;
+  };
+  std::vector<Row> near_borders;
+  for (std::size_t r = 0; r < n; ++r) {
+    Row row{r, {}};
+    std::memcpy(row.at.data(), from + r * bytes, sizeof row.at);
+    if (!is_near_a_border(row.at)) continue;
+    strays = strays || far_out(row.at);
+    near_borders.push_back(row);
+  }
+  const std::vector<Partner>& all = partners(any(strays) ? std::numeric_limits<double>::infinity() : width + slack);
+  std::vector<std::vector<char>> out(all.size());
+  for (std::size_t p = 0; p < all.size(); ++p)
+    for (const Vec3& shift : all[p].shifts)
+      for (const Row& row : near_borders) {
+        Triple at = row.at;
         bool near = true;
         for (int d = 0; d < 3; ++d) {
           at[d] += shift[d];
-          near = near && !(at[d] < box[d] - width || at[d] > box[3 + d] + width);
+          near = near && !(at[d] < all[p].lo[d] - width || at[d] > all[p].hi[d] + width);
         }
         if (!near) continue;
-        const std::size_t place = out.size();
-        out.insert(out.end(), from + r * bytes, from + (r + 1) * bytes);
-        std::memcpy(&out[place], at.data(), sizeof at);
+        const std::size_t place = out[p].size();
+        out[p].insert(out[p].end(), from + row.number * bytes, from + (row.number + 1) * bytes);
+        std::memcpy(&out[p][place], at.data(), sizeof at);
       }
-    }
-    send[rank] = static_cast<int>(out.size() / bytes) - send_at[rank];
-  }
-  MPI_Alltoall(send.data(), 1, MPI_INT, receive.data(), 1, MPI_INT, world);
-  int total = 0;
-  for (int r = 0; r < count; ++r) {
-    receive_at[r] = total;
-    total += receive[r];
-  }
   const RowType row(bytes);
-  MPI_Alltoallv(out.data(), send.data(), send_at.data(), row, room(static_cast<std::size_t>(total)), receive.data(),
-                receive_at.data(), row, world);
+  std::vector<MPI_Request> sent;
+  for (std::size_t p = 0; p < all.size(); ++p)
+    if (all[p].rank != me) {
+      sent.emplace_back();
+      MPI_Isend(out[p].data(), static_cast<int>(out[p].size() / bytes), row, all[p].rank, exchange_tag, world, &sent.back());
+    }
+  std::vector<int> comes(all.size());
+  std::size_t total = 0;
+  for (std::size_t p = 0; p < all.size(); ++p) {
+    if (all[p].rank == me) {
+      comes[p] = static_cast<int>(out[p].size() / bytes);
+    } else {
+      MPI_Status status;
+      MPI_Probe(all[p].rank, exchange_tag, world, &status);
+      MPI_Get_count(&status, row, &comes[p]);
+    }
+    total += static_cast<std::size_t>(comes[p]);
+  }
+  char* to = static_cast<char*>(room(total));
+  for (std::size_t p = 0; p < all.size(); ++p) {
+    if (all[p].rank == me)
+      std::copy(out[p].begin(), out[p].end(), to);
+    else
+      MPI_Recv(to, comes[p], row, all[p].rank, exchange_tag, world, MPI_STATUS_IGNORE);
+    to += static_cast<std::size_t>(comes[p]) * bytes;
+  }
+  MPI_Waitall(static_cast<int>(sent.size()), sent.data(), MPI_STATUSES_IGNORE);
 }
 
 void EngineRanks::gather_bytes(const void* rows, std::size_t n, std::size_t bytes, bool everywhere, const Room& room) const {

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <vector>
 
 #include "pointers.h"
 #include "ports.h"
+#include "rank_grid.h"
 
 namespace solidcull {
 
@@ -31,11 +33,19 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
   void gather_bytes(const void* rows, std::size_t n, std::size_t bytes, bool everywhere, const Room& room) const override;
 
  private:
+  struct Partner : RankGrid::Partner {
+    int rank;
+  };
   std::array<double, 6> own_borders() const;  // lo, hi
+  RankGrid grid() const;
+  const std::vector<Partner>& partners(double reach) const;
 
-  std::vector<double> boxes_;  // six per rank: lo, hi
+  std::array<double, 6> own_{};
+  RankGrid grid_;
+  bool known_ = false;  // both, as they were at the last update()
   std::vector<Vec3> shifts_{Vec3::Zero()};
   bool has_neighbours_ = false;
+  mutable std::map<double, std::vector<Partner>> partners_;  // by reach, in the order of ranks
 };
 
 }  // namespace solidcull

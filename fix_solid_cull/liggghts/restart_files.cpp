@@ -1,6 +1,8 @@
 #include "restart_files.h"
 
+#include <fcntl.h>
 #include <mpi.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -23,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* unfinished = ".part";
+constexpr const char* unfinished = ".part.";
 
 std::map<const LAMMPS_NS::LAMMPS*, std::string> files_read;
 
@@ -31,6 +33,21 @@ std::map<const LAMMPS_NS::LAMMPS*, std::string> files_read;
 std::string replaced(const std::string& name, char character, const std::string& by) {
   const std::size_t at = name.find(character);
   return at == std::string::npos ? name : name.substr(0, at) + by + name.substr(at + 1);
+}
+
+/// The name of a file that is not whole yet, beside it: no pattern that means the file means this one.
+std::string unfinished_name(const std::string& name) {
+  const std::size_t file = name.find_last_of('/') + 1;  // 0 where there is no folder
+  return name.substr(0, file) + unfinished + name.substr(file);
+}
+
+/// A file, or the names in a folder, are on the disk, whatever becomes of the machine. An errno, or 0.
+int to_disk(const std::string& path) {
+  const int file = ::open(path.c_str(), O_RDONLY);
+  if (file < 0) return errno;
+  const int error = ::fsync(file) == 0 || errno == EINVAL || errno == EROFS ? 0 : errno;  // some file systems know no fsync
+  ::close(file);
+  return error;
 }
 
 /// Of all files that the name with its * may mean, the one with the highest number, as the engine chooses it.
@@ -60,7 +77,7 @@ bool has_companions(const LAMMPS_NS::Modify& modify) {
 }  // namespace
 
 RestartFile::RestartFile(LAMMPS_NS::LAMMPS* lmp, const char* name)
-    : lmp_(lmp), fix_(fix_of(lmp)), name_(name), part_(name_ + (fix_ && !has_companions(*lmp->modify) ? unfinished : "")) {}
+    : lmp_(lmp), fix_(fix_of(lmp)), name_(name), part_(fix_ && !has_companions(*lmp->modify) ? unfinished_name(name_) : name_) {}
 
 void RestartFile::finish() {
   if (!fix_) return;
@@ -69,11 +86,15 @@ void RestartFile::finish() {
   const int me = lmp_->comm->me;
   int failed = 0, anywhere = 0;
   const auto takes_its_name = [&](const std::string& which) {
-    if (std::rename(replaced(part_, '%', which).c_str(), replaced(name_, '%', which).c_str()) != 0) failed = errno;
+    const std::string part = replaced(part_, '%', which), name = replaced(name_, '%', which);
+    failed = to_disk(part);
+    if (!failed && std::rename(part.c_str(), name.c_str()) != 0) failed = errno;
   };
   if (name_.find('%') != std::string::npos) takes_its_name(std::to_string(me));
   MPI_Barrier(lmp_->world);  // the head last: without it nothing reads the others
   if (me == 0) takes_its_name("base");
+  const fs::path folder = fs::path(name_).parent_path();
+  if (me == 0) to_disk(folder.empty() ? "." : folder.string());  // the name; the file is there by any of its two names
   MPI_Allreduce(&failed, &anywhere, 1, MPI_INT, MPI_MAX, lmp_->world);
   if (!anywhere) return;
   const std::string line = "the restart file " + name_ + " could not take its name (" + std::strerror(anywhere) +

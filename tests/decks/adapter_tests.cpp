@@ -49,6 +49,28 @@ std::vector<Row> rows_of(Engine& e) {
 
 class RanksNear : public testing::TestWithParam<bool> {};
 
+/// Each row is seen on the ranks, and by the images, that it is near, and nowhere else. Collective.
+void expect_seen(Engine& e, const EngineRanks& ranks, const std::vector<Row>& mine, double width) {
+  const LAMMPS_NS::Domain* box = e.lammps()->domain;
+  using Seen = std::multiset<std::tuple<int, double, double, double>>;
+  Seen expected, seen;
+  for (const Row& r : ranks.gather(mine))
+    for (const Vec3& shift : ranks.image_shifts()) {
+      if (r.rank == e.rank() && shift.isZero(0)) continue;
+      const double x[3] = {r.at[0] + shift[0], r.at[1] + shift[1], r.at[2] + shift[2]};
+      bool near = true;
+      for (int d = 0; d < 3; ++d) {  // a side that is not periodic has nothing behind it: what is there is the last rank's
+        const bool open = box->boundary[d][0] != 0;
+        near = near && (x[d] >= box->sublo[d] - width || (open && box->sublo[d] <= box->boxlo[d])) &&
+               (x[d] <= box->subhi[d] + width || (open && box->subhi[d] >= box->boxhi[d]));
+      }
+      if (near) expected.insert({r.tag, x[0], x[1], x[2]});
+    }
+  for (const Row& r : ranks.exchange(mine, width)) seen.insert({r.tag, r.at[0], r.at[1], r.at[2]});
+  EXPECT_EQ(seen, expected);
+  EXPECT_EQ(ranks.any(!seen.empty()), ranks.has_neighbours());
+}
+
 TEST_P(RanksNear, EachSeesWhatIsWithinTheWidthOfItsSubdomain) {
   Engine e;
   e.run(read_bed(small(GetParam())) + "run 0\n");
@@ -57,28 +79,23 @@ TEST_P(RanksNear, EachSeesWhatIsWithinTheWidthOfItsSubdomain) {
   EXPECT_EQ(ranks.count, e.ranks());
   EXPECT_EQ(ranks.has_neighbours(), GetParam() || e.ranks() > 1);
   EXPECT_EQ(ranks.image_shifts().size(), GetParam() ? 9u : 1u);
-  const std::vector<Row> mine = rows_of(e), all = ranks.gather(mine);
+  const std::vector<Row> all = ranks.gather(rows_of(e));
   EXPECT_EQ(all.size(), 300u);
   EXPECT_TRUE(std::is_sorted(all.begin(), all.end(), [](const Row& a, const Row& b) { return a.rank < b.rank; }));
-  EXPECT_EQ(ranks.gather_on_root(mine).size(), e.rank() == 0 ? 300u : 0u);
+  EXPECT_EQ(ranks.gather_on_root(rows_of(e)).size(), e.rank() == 0 ? 300u : 0u);
+  expect_seen(e, ranks, rows_of(e), 0.003);
+  expect_seen(e, ranks, rows_of(e), 0.5);  // wider than the box
+}
 
-  const LAMMPS_NS::Domain* box = e.lammps()->domain;
-  const double width = 0.003;
-  using Seen = std::multiset<std::tuple<int, double, double, double>>;
-  Seen expected, seen;
-  for (const Row& r : all)
-    for (const Vec3& shift : ranks.image_shifts()) {
-      if (r.rank == e.rank() && shift.isZero(0)) continue;
-      const double x[3] = {r.at[0] + shift[0], r.at[1] + shift[1], r.at[2] + shift[2]};
-      bool near = true;
-      for (int d = 0; d < 3; ++d) near = near && x[d] >= box->sublo[d] - width && x[d] <= box->subhi[d] + width;
-      if (near) expected.insert({r.tag, x[0], x[1], x[2]});
-    }
-  for (const Row& r : ranks.exchange(mine, width)) seen.insert({r.tag, r.at[0], r.at[1], r.at[2]});
-  EXPECT_EQ(seen, expected);
-  if (ranks.has_neighbours()) {
-    EXPECT_FALSE(seen.empty());
-  }
+TEST_P(RanksNear, SeeWhatIsFarFromTheRankThatTellsOfIt) {
+  Engine e;
+  e.run(read_bed(small(GetParam())) + "run 0\n");
+  EngineRanks ranks(e.lammps());
+  ranks.update();
+  std::vector<Row> mine = rows_of(e);
+  for (Row& r : mine)
+    for (double& x : r.at) x = 0.01 - x;
+  expect_seen(e, ranks, mine, 0.003);
 }
 
 TEST_P(RanksNear, EachPlaceHasOneOwner) {

@@ -1,0 +1,93 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "rank_grid.h"
+
+namespace solidcull {
+namespace {
+
+RankGrid grid_of(int x, int y, int z, bool periodic = false) {
+  RankGrid g;
+  const int n[] = {x, y, z};
+  for (int d = 0; d < 3; ++d)
+    for (int c = 0; c <= n[d]; ++c) g.cuts[d].push_back(static_cast<double>(c) / n[d]);
+  if (periodic) {
+    g.periods = Vec3::Ones();
+  } else {
+    for (auto& cuts : g.cuts) cuts.front() = -HUGE_VAL, cuts.back() = HUGE_VAL;
+  }
+  return g;
+}
+
+TEST(RankGrid, of_a_thousand_ranks_has_26_partners_at_most) {
+  for (const bool periodic : {false, true}) {
+    const RankGrid g = grid_of(10, 10, 10, periodic);
+    EXPECT_EQ(g.around({4, 5, 6}, 0.05).size(), 26u);
+    EXPECT_EQ(g.around({0, 0, 0}, 0.05).size(), periodic ? 26u : 7u);
+    EXPECT_EQ(g.around({0, 5, 0}, 0.05).size(), periodic ? 26u : 11u);
+  }
+}
+
+TEST(RankGrid, two_cells_are_partners_of_each_other_by_opposite_shifts) {
+  for (const bool periodic : {false, true})
+    for (const double width : {0.01, 0.3, 0.6}) {
+      const RankGrid g = grid_of(4, 3, 2, periodic);
+      for (int x = 0; x < 4; ++x)
+        for (int y = 0; y < 3; ++y)
+          for (int z = 0; z < 2; ++z)
+            for (const RankGrid::Partner& p : g.around({x, y, z}, width)) {
+              bool back = false;
+              for (const RankGrid::Partner& q : g.around(p.cell, width))
+                if (q.cell == RankGrid::Cell{x, y, z}) {
+                  back = true;
+                  EXPECT_EQ(q.shifts.size(), p.shifts.size());
+                  for (const Vec3& s : p.shifts)
+                    EXPECT_TRUE(std::any_of(q.shifts.begin(), q.shifts.end(), [&](const Vec3& t) { return t == -s; }));
+                }
+              EXPECT_TRUE(back);
+            }
+    }
+}
+
+TEST(RankGrid, whoever_is_within_the_width_is_a_partner) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (const bool periodic : {false, true}) {
+    const RankGrid g = grid_of(5, 4, 3, periodic);
+    const double width = 0.21;
+    for (int n = 0; n < 2000; ++n) {
+      const Vec3 x(uniform(random), uniform(random), uniform(random));
+      const RankGrid::Cell own{static_cast<int>(5 * x[0]), static_cast<int>(4 * x[1]), static_cast<int>(3 * x[2])};
+      int due = 0, found = 0;
+      const auto near = [&](const Vec3& y, const Vec3& lo, const Vec3& hi) {
+        return (y.array() >= lo.array() - width).all() && (y.array() <= hi.array() + width).all();
+      };
+      for (int i = -1; i <= 1; ++i)
+        for (int j = -1; j <= 1; ++j)
+          for (int k = -1; k <= 1; ++k) {
+            if (!periodic && (i || j || k)) continue;
+            for (int c = 0; c < 60; ++c) {
+              const RankGrid::Cell cell{c / 12, c / 3 % 4, c % 3};
+              if (cell == own && !i && !j && !k) continue;
+              due += near(x + Vec3(i, j, k), g.lo(cell), g.hi(cell));
+            }
+          }
+      for (const RankGrid::Partner& p : g.around(own, width))
+        for (const Vec3& s : p.shifts) found += near(x + s, p.lo, p.hi);
+      EXPECT_EQ(found, due) << x.transpose();
+    }
+  }
+}
+
+TEST(RankGrid, a_wide_reach_takes_all_cells) {
+  EXPECT_EQ(grid_of(3, 3, 3).around({0, 0, 0}, 10).size(), 26u);
+  EXPECT_EQ(grid_of(1, 1, 1).around({0, 0, 0}, 10).size(), 0u);
+  const auto itself = grid_of(1, 1, 1, true).around({0, 0, 0}, 0.1);
+  ASSERT_EQ(itself.size(), 1u);
+  EXPECT_EQ(itself[0].shifts.size(), 26u);
+}
+
+}  // namespace
+}  // namespace solidcull
