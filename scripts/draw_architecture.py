@@ -21,21 +21,23 @@ FLOORS = [
                                                                "EngineRanks", "EngineRun", "EngineMemory"]]),
     ("culling/", "decides and acts", "#dfe8f7", [
         ["Culling"],
+        ["Look", "Change", "BetweenRuns"],
         ["WallSurvey", "Survey", "Cover", "Pacing", "Grounding", "WakeRequests", "EffectiveGravity"],
-        ["Shell", "BodyMotion", "BodyGroups", "MembershipChange", "ContactFreezing", "ShellClosure", "StoreExchange"],
-        ["Handover", "Snapshot", "Parcels", "LostAtoms", "BodyMeshes", "OutputFiles", "Report"]]),
+        ["Shell", "BodyMotion", "BodyGroups", "MembershipChange", "ContactFreezing", "DeepGranules", "StoreExchange"],
+        ["ShellClosure", "Refill", "Handover", "Parcels", "Snapshot", "BodyMeshes", "Report"]]),
     ("solid/", "what is culled", "#dcefdc", [["Solid"], ["SolidBodies", "GranuleStore", "FrozenContacts", "FrozenWallLoads", "Ledger"]]),
+    ("packing/", "of spheres", "#eeeeee", [["Sites", "SphereRelaxation"]]),
     ("laws/", "what the user sets", "#eeeeee", [["Scales", "SolidStateLaw", "WakeUpLaw", "CullingBenefit"]]),
     ("containers/", "maps and cells", "#eeeeee", [["FlatMap", "TagIndex", "SphereCells", "PackedRows", "ChunkedArray"]]),
 ]
 # the way of one granule from the engine to the store
-WAY = ["Survey", "MembershipChange", "ContactFreezing", "SolidBodies", "ShellClosure", "StoreExchange", "GranuleStore"]
+WAY = ["Survey", "MembershipChange", "ContactFreezing", "SolidBodies", "DeepGranules", "StoreExchange", "GranuleStore"]
 WIDTH, LEFT, ROW, GAP = 15.0, 1.9, 0.62, 0.28
 
 
 def main():
     file = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "fix_solid_cull" / "architecture.png"
-    figure, axes = plt.subplots(figsize=(12, 7.2))
+    figure, axes = plt.subplots(figsize=(12, 8.4))
     places, places_width, top = {}, {}, 0.0
     for folder, what, colour, rows in FLOORS:
         if folder == "culling/":

@@ -132,7 +132,7 @@ def how_parts_hold_each_other(house, files, by_class):
     constructors = references = 0
     parts = []
     for f in files:
-        if f.parent.name != "culling" or f.suffix != ".h":
+        if "culling" not in f.parts or f.suffix != ".h":
             continue
         for name, _, body in classes(without_comments(f.read_text())):
             for m in re.finditer(rf"(?<![\w~:]){name}\(", flat(body)):
