@@ -133,6 +133,15 @@ void write_array(WholeFile& file, const std::string& name, const std::vector<T>&
   file.write("</DataArray>\n");
 }
 
+/// On many ranks bodies have numbers that an Int32 does not hold.
+void write_numbers_of_bodies(WholeFile& file, const std::vector<std::int64_t>& body) {
+  const bool narrow = std::all_of(body.begin(), body.end(), [](std::int64_t b) { return b == static_cast<int>(b); });
+  if (narrow)
+    write_array(file, "body", std::vector<int>(body.begin(), body.end()));
+  else
+    write_array(file, "body", body);
+}
+
 void begin_poly_data(WholeFile& file, std::size_t points, std::size_t verts, std::size_t polys) {
   file.write(
       "<?xml version=\"1.0\"?>\n"
@@ -191,7 +200,7 @@ void write_stl(const std::string& file, const TriangleMesh& mesh) {
   out.commit();
 }
 
-void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<int>& body_of_triangle) {
+void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<std::int64_t>& body_of_triangle) {
   if (!body_of_triangle.empty() && body_of_triangle.size() != mesh.triangles.size())
     throw std::invalid_argument("write_vtp: " + std::to_string(body_of_triangle.size()) + " body numbers for " +
                                 std::to_string(mesh.triangles.size()) + " triangles");
@@ -207,7 +216,7 @@ void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vec
   begin_poly_data(out, mesh.vertices.size(), 0, mesh.triangles.size());
   if (!body_of_triangle.empty()) {
     out.write("      <CellData Scalars=\"body\">\n");
-    write_array(out, "body", body_of_triangle);
+    write_numbers_of_bodies(out, body_of_triangle);
     out.write("      </CellData>\n");
   }
   write_points(out, position);
@@ -232,7 +241,7 @@ void write_bed_vtp(const std::string& file, const BedTable& bed) {
   write_array(out, "tag", bed.tag);
   write_array(out, "type", bed.type);
   write_array(out, "state", bed.state);
-  write_array(out, "body", bed.body);
+  write_numbers_of_bodies(out, bed.body);
   out.write("      </PointData>\n");
   write_points(out, bed.position);
   write_cells(out, "Verts", connectivity, 1);

@@ -14,8 +14,9 @@ void check_folder_of(const std::string& file);
 /// Binary STL; throws std::runtime_error naming the file and the reason if it cannot be written. Local.
 void write_stl(const std::string& file, const TriangleMesh& mesh);
 
-/// VTK XML PolyData of triangles with one Int32 cell array "body" (empty, or one value per triangle). Local.
-void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<int>& body_of_triangle);
+/// VTK XML PolyData of triangles with one cell array "body" (empty, or one value per triangle), Int32 where that holds all values, else Int64.
+/// Local.
+void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<std::int64_t>& body_of_triangle);
 
 /// OpenVDB file with one level-set grid per mesh, named by `names`. Local.
 void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>& meshes, const std::vector<std::string>& names);
@@ -28,7 +29,8 @@ struct BedTable {
   std::vector<float> position;  // 3 per granule
   std::vector<float> velocity;  // 3 per granule
   std::vector<float> radius;
-  std::vector<int> tag, type, state, body;
+  std::vector<int> tag, type, state;
+  std::vector<std::int64_t> body;  // written as Int32 where that holds all values
 };
 
 /// VTK XML PolyData of points (one vertex cell each) with point arrays radius, velocity, tag, type, state, body.

@@ -271,7 +271,7 @@ class KeywordRefusals(Case):
         "mesh x a.stl": ("mesh", "x", FILE), "mesh 10 a.obj": ("mesh", "a.obj", MESH), "mesh 10": ("mesh", None, MESH),
         "bed 0 a.vtp": ("bed", "0", FILE), "bed 10 a.stl": ("bed", "a.stl", BED), "bed": ("bed", None, FILE),
     }
-    KEYWORDS = "bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, store, tolerance, voxel"
+    KEYWORDS = "balance, bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, store, tolerance, voxel"
 
     def test_wrong_type_range_and_missing_values(self):
         for words, (keyword, value, wanted) in self.WRONG.items():

@@ -48,6 +48,23 @@ StoredGranule Bed::interface_granule(int i) const {
   return g;
 }
 
+void Bed::see_largest_radius() {
+  largest_radius = largest_radius_here(*this);
+  ranks.largest(&largest_radius, 1);
+}
+
+Wakes Bed::take_wakes(bool all) {
+  // a body that wakes on one rank wakes on each
+  std::vector<char> asked;
+  for (std::size_t p = 0; p < groups.spanning_parts(); ++p) asked.push_back(wake.asks_body(groups.body_of_part(p)));
+  groups.unite(asked, [](char& whole, char other) { whole |= other; });
+  for (std::size_t p = 0; p < asked.size(); ++p)
+    if (asked[p]) wake.ask_body(groups.body_of_part(p));
+  // atoms may be a skin outside of their subdomain; what rests beside a ball is asked for within a diameter of it
+  const double margin = contact_reach(*this) + stored.slack() + scales.diameter();
+  return wake.take(ranks, scales.wake_up(), all, margin);
+}
+
 void Bed::label_bodies() {
   for (int i = 0; i < atoms.owned; ++i) shell.label(i, shell[i].locked ? groups.key_of(shell[i].body) : 0);
 }

@@ -24,6 +24,10 @@ struct Bed : BedState, BodyFollower {
   void adopt_places();
   /// Interface granule i as its body knows it, with what it has in the shell. Local.
   StoredGranule interface_granule(int i) const;
+  /// The largest radius is known on all ranks. Collective; a change does it, too.
+  void see_largest_radius();
+  /// All that wakes on this rank, `all` if some rank has asked so. Collective.
+  Wakes take_wakes(bool all);
   /// Each atom is labelled with its body's number over all ranks. Local.
   void label_bodies();
 

@@ -21,6 +21,7 @@ struct BedState : Ports {
   Shell shell;
   AtomIndex index;
   Arrivals arrivals;
+  double largest_radius = 0;  ///< of any granule of any rank, atom or stored, as of the last change (m)
 };
 
 }  // namespace solidcull

@@ -27,7 +27,7 @@ void BetweenRuns::finish_show() {
   if (!show_unfinished_) return;
   show_unfinished_ = false;
   bed_.ranks.update();
-  bed_.atoms.publish_counts(0);
+  bed_.census.publish_atoms(0);
 }
 
 void BetweenRuns::lend_contacts() {
@@ -38,7 +38,7 @@ void BetweenRuns::lend_contacts() {
 void BetweenRuns::take_contacts_back() {
   leave_lists();
   p_.shown.take_contacts();
-  bed_.atoms.publish_counts(0);
+  bed_.census.publish_atoms(0);
 }
 
 bool BetweenRuns::culls_of(int groups) const {
@@ -55,7 +55,7 @@ void BetweenRuns::hide_bed() {
   finish_show();
   p_.shown.hide();
   p_.exchange.set_stored_groups(p_.shown.groups_of_guests());
-  bed_.atoms.publish_counts(-bed_.census.stored());
+  bed_.census.publish_atoms(-bed_.census.stored());
 }
 
 void BetweenRuns::take_changes(bool other_walls) {

@@ -1,13 +1,12 @@
 // One body over ranks: parts on several ranks that touch are one rigid body (theory.md#ranks).
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <map>
 #include <vector>
 
 #include "flat_map.h"
 #include "granule_masses.h"
+#include "rank_trees.h"
 #include "stored_search.h"
 
 namespace solidcull {
@@ -15,21 +14,43 @@ namespace solidcull {
 /// Keys number bodies over all ranks, from 1; on one rank a body's key is its number. 0: no body.
 class BodyGroups {
  public:
+  using Key = std::int64_t;
+
   BodyGroups(BedState& bed, const StoredSearch& stored, const GranuleMasses& masses)
-      : bed_(bed), stored_(stored), masses_(masses) {}
+      : bed_(bed), stored_(stored), masses_(masses), trees_(bed.ranks) {}
 
   // --- local
-  int key_of(int body) const;
-  int key_of_atom(int i) const;  ///< owned or ghost, after share(); 0: exterior
+  Key key_of(int body) const;
+  Key key_of_atom(int i) const;  ///< owned or ghost, after share(); 0: exterior
   /// Key of the body of an interface ghost; nullptr: the ghost is no interface granule, or its tag no ghost.
-  const int* ghost(std::int64_t tag) const { return ghost_key_.find(tag); }
-  /// Place among the bodies that span ranks, the same on all ranks; -1: all of it is here.
-  int spanning(int body) const;
+  const Key* ghost(std::int64_t tag) const { return ghost_key_.find(tag); }
+  /// Place among this rank's parts of bodies that span ranks; -1: all of it is here.
+  int spanning(int body) const { return trees_.place_of(body); }
   bool spans(int body) const { return spanning(body) >= 0; }
-  std::size_t spanning_bodies() const { return spanning_.size(); }
-  bool has_key_of_first_part(int body) const;  ///< so that each body over all ranks is counted once
+  std::size_t spanning_parts() const { return trees_.parts().size(); }
+  /// The body of such a part, by its number here; nullptr where nothing is left of it since bodies were settled.
+  int body_of_part(std::size_t place) const { return trees_.parts()[place].body; }
+  const SolidBody* part(std::size_t place) const {
+    const auto& all = bed_.solid.bodies().bodies();
+    const auto found = all.find(body_of_part(place));
+    return found == all.end() ? nullptr : &found->second;
+  }
+  /// So that each body over all ranks is counted once.
+  bool has_key_of_first_part(int body) const { return key_of(body) == trees_.own_key(body); }
 
   void forget_ghosts() { ghost_key_.clear(); }  ///< nothing is culled on any rank
+  /// Bodies that are on this rank alone have the motion of their granules; what is tied to other ranks waits for settle().
+  void settle_those_here();
+
+  // --- among the ranks of each body that spans some
+  /// See RankTrees::unite: a row for each of this rank's parts.
+  template <class Row, class Unite, class... TakesPart>
+  void unite(std::vector<Row>& rows, Unite unite, TakesPart... takes_part) const {
+    trees_.unite(rows, unite, takes_part...);
+  }
+
+  /// The same after a look has grounded some: `changed`, some here; `over_ranks`, which of this rank's parts.
+  void settle_grounded(bool changed, const std::vector<char>& over_ranks);
 
   // --- collective
   /// Which parts are one body: those that contacts across ranks tie together.
@@ -42,19 +63,15 @@ class BodyGroups {
   void release_memory();
 
  private:
-  struct Group {
-    int key;     // the body's number on all ranks
-    Vec3 shift;  // brings this rank's part to the image in which the whole is summed (m)
-  };
   std::vector<std::int64_t> stored_at_borders() const;
+  template <class TakesPart>
+  void settle_those_over_ranks(TakesPart takes_part);
 
   BedState& bed_;
   const StoredSearch& stored_;
   const GranuleMasses& masses_;
-  std::map<int, Group> groups_;              // local body -> the body that it is a part of; empty on one rank
-  std::vector<int> spanning_;                // keys of bodies that span ranks, the same on all ranks
-  std::map<int, std::array<bool, 3>> tied_;  // key -> tied to its own periodic image in these directions
-  FlatMap<int> ghost_key_;                   // tag -> key of the body of an interface ghost
+  RankTrees trees_;
+  FlatMap<Key> ghost_key_;  // tag -> key of the body of an interface ghost
 };
 
 }  // namespace solidcull

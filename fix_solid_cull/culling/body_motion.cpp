@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "numbers.h"
 #include "release.h"
@@ -10,6 +11,9 @@
 namespace solidcull {
 
 namespace {
+
+// what presses on a body that stands, and is less than this share of a granule's weight, is not told to other ranks at once
+constexpr double no_difference = 0.01;
 
 bool moves_by_numbers(const SolidBody& b) {
   return std::isfinite(b.pose.origin().sum() + b.pose.quaternion().coeffs().sum() + b.twist.velocity.sum() + b.twist.spin.sum());
@@ -113,25 +117,42 @@ void BodyMotion::take_loads() {
 }
 
 void BodyMotion::sum_over_ranks() {
-  if (bed_.groups.spanning_bodies() == 0) return;
-  constexpr std::size_t numbers = 9;
-  std::vector<double> sums(numbers * bed_.groups.spanning_bodies(), 0.0);
+  struct Loads {
+    Triple force, torque, change;
+  };
+  const std::size_t parts = bed_.groups.spanning_parts();
+  differs_ = false;
+  if (parts == 0) return;
+  const bool tells = std::exchange(tells_, false) || told_.size() != parts;
+  told_.resize(parts);
+  std::vector<Loads> all(parts, Loads{});
+  std::vector<char> stands(parts, 0);
   for (const ActiveBody& a : active_) {
     if (a.spanning < 0) continue;
-    double* of = &sums[numbers * static_cast<std::size_t>(a.spanning)];
-    for (int d = 0; d < 3; ++d) {
-      of[d] += a.force[d];
-      of[3 + d] += a.torque[d];
-      of[6 + d] += a.change[d];
-    }
+    const std::size_t p = static_cast<std::size_t>(a.spanning);
+    all[p] = {triple(a.force), triple(a.torque), triple(a.change)};
+    stands[p] = a.stands;
+    const double granule = a.body->mass.mass / static_cast<double>(a.body->mass.count) * bed_.scales.gravity();
+    differs_ = differs_ || (a.stands && (a.change - told_[p].here).norm() > no_difference * granule);
+    if (tells) told_[p].here = a.change;
   }
-  bed_.ranks.sum(sums.data(), static_cast<int>(sums.size()));
+  bed_.groups.unite(
+      all,
+      [](Loads& one, const Loads& other) {
+        for (int d = 0; d < 3; ++d) {
+          one.force[d] += other.force[d];
+          one.torque[d] += other.torque[d];
+          one.change[d] += other.change[d];
+        }
+      },
+      [&](int place) { return tells || !stands[static_cast<std::size_t>(place)]; });
   for (ActiveBody& a : active_) {
     if (a.spanning < 0) continue;
-    const double* of = &sums[numbers * static_cast<std::size_t>(a.spanning)];
-    a.force = vec(of);
-    a.torque = vec(of + 3);
-    a.change = vec(of + 6);
+    const std::size_t p = static_cast<std::size_t>(a.spanning);
+    a.force = vec(all[p].force);
+    a.torque = vec(all[p].torque);
+    if (tells) told_[p].all = vec(all[p].change);
+    a.change = told_[p].all;
   }
 }
 
@@ -183,11 +204,6 @@ double BodyMotion::way_in_a_step(const ActiveBody& a) const {
 bool BodyMotion::comes_too_far(int steps) const {
   return std::any_of(active_.begin(), active_.end(),
                      [&](const ActiveBody& a) { return a.way + steps * way_in_a_step(a) > 0.5 * bed_.run.skin; });
-}
-
-bool BodyMotion::is_fast(int steps) const {
-  return std::any_of(active_.begin(), active_.end(),
-                     [&](const ActiveBody& a) { return steps * way_in_a_step(a) > 0.25 * bed_.run.skin; });
 }
 
 /// The velocity field over places in the body's frame: v = constant + gradient * place.

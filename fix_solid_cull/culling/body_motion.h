@@ -19,7 +19,7 @@ struct ActiveBody {
   Vec3 torque = Vec3::Zero();  ///< and about its centre of mass (N m)
   double reach = 0;            ///< of its interior granules: farthest from the centre (m)
   double way = 0;              ///< bound of their way since the last reneighbouring (m)
-  int spanning = -1;           ///< its place among the bodies that span ranks
+  int spanning = -1;           ///< see BodyGroups::spanning
 };
 
 /// The bodies' loads, momentum and places, and the interface granules that ride on them.
@@ -35,7 +35,15 @@ class BodyMotion : public BodyFollower {
   double largest_excess() const { return largest_excess_; }
 
   /// The engine has searched for neighbours: what is near what is known, wherever bodies have been since the last time. Local.
-  void begin_lists() { stale_ = true; }
+  void begin_lists() {
+    stale_ = true;
+    tell_next();
+  }
+  /// What presses on bodies that stand is summed over their ranks in the next step: all ranks say so alike. Else it is taken to be
+  /// what it was, but for what differs_from_told(). Local.
+  void tell_next() { tells_ = true; }
+  /// In this step, on this rank: by more than a hundredth of a granule's weight. Local.
+  bool differs_from_told() const { return differs_; }
   /// Whether bodies or their atoms are others since they were listed. Local.
   bool stale() const { return stale_ || listed_ != bed_.shell.version(); }
   void merged(int, int, bool) override { stale_ = true; }
@@ -54,7 +62,7 @@ class BodyMotion : public BodyFollower {
   void kick_and_drift();
   /// Interface granules go where their body is. Local.
   void place();
-  /// Takes the contact forces off the interface granules, and sums them over bodies. Collective.
+  /// Takes the contact forces off the interface granules, and sums them over bodies. Among the ranks of bodies that span some.
   void take_loads();
   /// The other half of the kick. Local.
   void kick();
@@ -64,10 +72,6 @@ class BodyMotion : public BodyFollower {
 
   /// Whether a stored granule may have gone so far that something unseen is near: within so many steps from now. Local.
   bool comes_too_far(int steps) const;
-  bool is_fast(int steps) const;
-  /// Whether ranks ask each other in each step if a body has come too far: one was fast when they talked last. Local.
-  void watch(bool on) { watched_ = on; }
-  bool is_watched() const { return watched_; }
 
   void release_memory();
 
@@ -86,7 +90,12 @@ class BodyMotion : public BodyFollower {
   std::vector<std::size_t> slot_;    // their bodies in active_
   std::vector<Vec3> place_;          // and places there
   std::vector<std::size_t> riding_;  // those of them whose bodies move
-  bool stale_ = true, watched_ = false;
+  bool stale_ = true;
+  struct Told {
+    Vec3 here = Vec3::Zero(), all = Vec3::Zero();  // what pressed on a body that stands: on this rank, and on all
+  };
+  std::vector<Told> told_;  // when ranks told each other last, by ActiveBody::spanning
+  bool tells_ = true, differs_ = false;
   std::uint64_t listed_ = 0;  // version of the shell then
   double largest_excess_ = 0;
 };

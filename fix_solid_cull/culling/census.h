@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 
 #include "bed_state.h"
 
@@ -17,6 +18,20 @@ class Census {
   std::int64_t locked() const { return locked_; }
   bool several_bodies() const { return bodies_ > 1; }  ///< with one alone, none can come near another
 
+  /// Bodies have changed: they may be several on several ranks, until they are counted. Local.
+  void expect_several() { bodies_ = bed_.ranks.count > 1 ? 2 : static_cast<std::int64_t>(bed_.solid.bodies().size()); }
+  /// As counted over all ranks; returns how many more are stored than the time before. Local.
+  std::int64_t set(std::int64_t bodies, std::int64_t locked, std::int64_t stored) {
+    bodies_ = bodies;
+    locked_ = locked;
+    return stored - std::exchange(stored_, stored);
+  }
+  /// The engine learns how many atoms there are, see Atoms::publish_counts(). Collective.
+  void publish_atoms(std::int64_t returned) {
+    std::int64_t all[2] = {bed_.atoms.owned, bed_.atoms.map_is_too_small()};
+    bed_.ranks.sum(all, 2);
+    bed_.atoms.publish_counts(returned, all[0], all[1] != 0);
+  }
   /// Collective.
   void count_bodies() {
     std::int64_t counts[2] = {static_cast<std::int64_t>(bed_.solid.bodies().size()),

@@ -1,5 +1,6 @@
 #include "change.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 
@@ -17,25 +18,101 @@ constexpr double sort_share = 0.05;
 /// Who leaves for another rank must be known before the engine sends it.
 void Change::follow_box() {
   bed_.ranks.follow_box();
-  if (!bed_.ranks.any(bed_.ranks.subdomain_changed())) return;
+  if (bed_.ranks.subdomains_changed()) take_subdomains();
+}
+
+/// After all that ranks do together by the old ones: what is another rank's now goes there as this change ends, atoms with the
+/// engine's exchange.
+void Change::move_cuts() {
+  if (p_.balance.move()) take_subdomains();
+}
+
+void Change::take_subdomains() {
   bed_.ranks.update();
   p_.handover.forget_homes();
+}
+
+/// What came out of a store that lags behind, or a deck has moved.
+bool Change::any_far_out() const {
+  if (bed_.ranks.count == 1) return false;
+  if (p_.refill.acts()) return true;  // granules get their places as they come out
+  const Atoms& atoms = bed_.atoms;
+  for (int i = 0; i < atoms.owned; ++i)
+    if (bed_.ranks.is_far_out(atoms.place(i))) return true;
+  bool far = false;
+  bed_.solid.store().for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
+    if (far) return;
+    const Pose& pose = bed_.solid.pose_of_frame(frame);
+    const Vec3 middle = pose.to_world(0.5 * (lo + hi)), half = turned_half_box(pose.turn(), 0.5 * (hi - lo));
+    // a place is as far out as its farthest coordinate: two corners tell for the box
+    if (!bed_.ranks.is_far_out(middle - half) && !bed_.ranks.is_far_out(middle + half)) return;
+    bed_.solid.store().for_each_in_box(frame, lo, hi,
+                                       [&](const Resident& g) { far = far || bed_.ranks.is_far_out(bed_.solid.in_world(g)); });
+  });
+  return far;
+}
+
+auto Change::begin(const Look& look) -> Occasion {
+  std::int64_t highest = 0;
+  for (int i = 0; i < bed_.atoms.owned; ++i) highest = std::max<std::int64_t>(highest, bed_.atoms.tag[i]);
+  enum { asked, wakes_all, lets_go, asks_to_store, made, far, unsettled, tag, radius, numbers };
+  double all[numbers] = {};
+  all[asked] = look.chosen().any_here() || bed_.wake.any_here();
+  all[wakes_all] = bed_.wake.asks_all();
+  all[lets_go] = p_.grounding.lets_go();
+  all[asks_to_store] = p_.deep.asked();
+  all[made] = p_.closure.some_made();
+  all[far] = any_far_out();
+  all[unsettled] = unsettled_;
+  all[tag] = static_cast<double>(highest);
+  all[radius] = largest_radius_here(bed_);
+  bed_.ranks.largest(all, numbers);
+  bed_.largest_radius = all[radius];
+  bed_.ranks.expect_far_out(all[far] != 0);
+  if (all[unsettled] != 0) settle_bodies();
+  Occasion now;
+  now.asked = all[asked] != 0;
+  now.wakes_all = all[wakes_all] != 0;
+  now.lets_go = all[lets_go] != 0;
+  now.asks_to_store = all[asks_to_store] != 0;
+  now.made = all[made] != 0;
+  now.highest = static_cast<std::int64_t>(all[tag]);
+  return now;
+}
+
+auto Change::see(bool shell_changed, const MembershipChange& c) -> Outcome {
+  enum { changed, leave, sorts, map, bodies, locked, stored, atoms, numbers };
+  std::int64_t all[numbers] = {};
+  all[changed] = shell_changed;
+  all[leave] = p_.handover.find_leaving();
+  all[sorts] = static_cast<double>(c.moved()) > sort_share * bed_.atoms.owned;
+  all[map] = bed_.atoms.map_is_too_small();
+  all[bodies] = static_cast<std::int64_t>(bed_.solid.bodies().size());
+  all[locked] = static_cast<std::int64_t>(bed_.solid.locked());
+  all[stored] = static_cast<std::int64_t>(bed_.solid.store().size());
+  all[atoms] = bed_.atoms.owned;
+  bed_.ranks.sum(all, numbers);
+  return {all[changed] != 0, all[leave] != 0, all[sorts] != 0, all[map] != 0, all[bodies], all[locked], all[stored], all[atoms]};
 }
 
 void Change::make(Look& look, Phase phase) {
   check_numbers(bed_.atoms);  // before they are sorted into cells, here and by the engine
   if (!bed_.solid.has_store()) return;
   const auto timed = p_.report.time(Part::membership);
-  meet_new_granules(phase);
   follow_box();
   // another fix may have deleted granules in this hook
   if (phase == Phase::stepping && bed_.census.something_locked()) forget_lost();
+  const Occasion now = begin(look);
+  const bool overlaps = now.made && meet_new_granules(phase);
   bed_.memory.freed(p_.exchange.begin_change());
-  if (!bed_.census.something_locked() && !bed_.ranks.any(look.chosen().any_here() || bed_.wake.any_at_all())) return;
+  if (!bed_.census.something_locked() && !now.asked && !now.wakes_all) {
+    move_cuts();
+    return;
+  }
   if (phase == Phase::stepping) bed_.memory.make_room(look.chosen().chosen.size());
   p_.refill.begin_change();
-  MembershipChange c(bed_, p_.for_change(), bed_.wake.take(bed_.ranks, bed_.scales.wake_up()), look.take());
-  const bool changes = bed_.ranks.any(c.any_here() || p_.grounding.lets_go());
+  MembershipChange c(bed_, p_.for_change(), bed_.take_wakes(now.wakes_all), look.take());
+  const bool changes = now.changes() || overlaps;
   bool shell_changed = false;
   p_.grounding.let_go();
   if (changes || bed_.ranks.count > 1) bed_.index.index(bed_.atoms);
@@ -50,11 +127,22 @@ void Change::make(Look& look, Phase phase) {
     if (bed_.census.several_bodies() || p_.refill.acts()) close_shell(true, shell_changed);
     pack(shell_changed);
   }
-  store_and_fetch(c, changes, shell_changed);
+  store_and_fetch(c, now, changes, shell_changed);
   if (p_.refill.acts() && bed_.ranks.any(shell_changed)) settle_bodies();  // granules stand elsewhere in them
-  if (changes || bed_.ranks.any(shell_changed)) publish(c);
   follow_box();  // places of stored granules are rounded: the last digit of a border decides who owns what lies on it
-  if (p_.handover.send_home()) count_restored();
+  move_cuts();
+  const Outcome all = see(shell_changed, c);
+  const std::int64_t went = bed_.census.set(all.bodies, all.locked, all.stored);
+  if (changes || all.shell_changed) {
+    bed_.atoms.publish_counts(-went, all.atoms, all.map_too_small);
+    if (all.sorts) bed_.atoms.sort_soon();
+    p_.report.membership_changed();
+    bed_.label_bodies();
+  }
+  if (all.some_leave) {
+    p_.handover.send_home();
+    bed_.label_bodies();
+  }
   p_.handover.remember();
   fit_memory(phase);
   p_.motion.refresh();
@@ -63,8 +151,10 @@ void Change::make(Look& look, Phase phase) {
 
 /// What was made inside a stored granule cannot stay. Stored ones come back for each fix that inserts, so nothing that LIGGGHTS
 /// does is known to come here; but between runs a deck may make granules anywhere, and fixes need not look for overlap. What was
-/// culled there wakes before the first force: a blow is shared by two. Before anything comes out of the store.
-void Change::meet_new_granules(Phase phase) {
+/// culled there wakes before the first force: a blow is shared by two. Before anything comes out of the store. Whether something
+/// was.
+bool Change::meet_new_granules(Phase phase) {
+  bool overlaps = false;
   if (bed_.census.something_locked()) {
     const ShellClosure::Overlapped found = p_.closure.by_new_granules();
     if (found.in_stored && phase == Phase::stepping)
@@ -72,8 +162,10 @@ void Change::meet_new_granules(Phase phase) {
                        " was inserted into the place of a culled one: give the insertion a region above the bed, or unfix " +
                        bed_.run.name + " first");
     for (const Vec3& place : found.places) bed_.wake.ask(place, bed_.scales.wake_up().radius(1));
+    overlaps = found.some;
   }
   p_.closure.forget_new();
+  return overlaps;
 }
 
 /// Invariant I1: what is near comes out of the store.
@@ -89,20 +181,12 @@ void Change::pack(bool& shell_changed) {
 }
 
 /// And what nothing is near goes in.
-void Change::store_and_fetch(const MembershipChange& c, bool changes, bool& shell_changed) {
+void Change::store_and_fetch(const MembershipChange& c, const Occasion& now, bool changes, bool& shell_changed) {
   if (changes || (bed_.scales.sleeping() && bed_.census.something_locked()))
-    shell_changed |= p_.deep.store(c.locked_some(), changes, [&](const std::vector<int>& atoms, const DeepGranules::Near& near) {
+    shell_changed |= p_.deep.store({c.locked_some(), now.asks_to_store, changes, now.highest}, [&](const std::vector<int>& atoms, const DeepGranules::Near& near) {
       return p_.refill.acts() ? p_.refill.put_away(atoms, near) : p_.exchange.put_away(atoms);
     }) > 0;
   if (bed_.census.something_stored()) shell_changed |= p_.closure.fetch_from_outside() > 0;
-}
-
-/// The engine and the report learn how many granules there are where.
-void Change::publish(const MembershipChange& c) {
-  bed_.atoms.publish_counts(-bed_.census.count_stored());
-  if (bed_.ranks.any(static_cast<double>(c.moved()) > sort_share * bed_.atoms.owned)) bed_.atoms.sort_soon();
-  p_.report.membership_changed();
-  bed_.label_bodies();
 }
 
 void Change::count_restored() {
@@ -136,10 +220,19 @@ void Change::take_arrivals() {
 }
 
 void Change::forget_lost() {
-  if (p_.handover.forget_lost()) settle_bodies();
+  if (!p_.handover.forget_lost()) return;
+  if (bed_.ranks.count == 1) {
+    settle_bodies();
+    return;
+  }
+  unsettled_ = true;
+  bed_.groups.settle_those_here();
+  bed_.label_bodies();
 }
 
 void Change::settle_bodies() {
+  unsettled_ = false;
+  bed_.index.index(bed_.atoms);
   bed_.groups.settle();
   bed_.census.count_bodies();
   bed_.label_bodies();

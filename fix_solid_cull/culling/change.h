@@ -18,23 +18,45 @@ class Change {
 
   /// Interface granules may have come from other ranks, or left the box.
   void take_arrivals();
-  /// The engine may have lost interface granules.
+  /// The engine may have lost interface granules. Local: bodies over several ranks are settled with the next change.
   void forget_lost();
+  /// Whether some wait for that. Local.
+  bool is_unsettled() const { return unsettled_; }
   /// After granules came from a file or another rank.
   void count_restored();
 
  private:
+  /// What all ranks know as a change begins.
+  struct Occasion {
+    bool asked = false;          ///< something is to wake, or was chosen
+    bool wakes_all = false;
+    bool lets_go = false;        ///< bodies that stood on walls do no longer
+    bool asks_to_store = false;
+    bool made = false;           ///< there are new granules
+    std::int64_t highest = 0;    ///< tag of an atom
+    bool changes() const { return asked || wakes_all || lets_go; }
+  };
+  /// And when it has been made.
+  struct Outcome {
+    bool shell_changed = false, some_leave = false, sorts = false, map_too_small = false;
+    std::int64_t bodies = 0, locked = 0, stored = 0, atoms = 0;
+  };
+  Occasion begin(const Look& look);
+  Outcome see(bool shell_changed, const MembershipChange& c);
+  bool any_far_out() const;
   void settle_bodies();
   void follow_box();
-  void meet_new_granules(Phase phase);
+  void move_cuts();
+  void take_subdomains();
+  bool meet_new_granules(Phase phase);
   void close_shell(bool changes, bool& shell_changed);
   void pack(bool& shell_changed);
-  void store_and_fetch(const MembershipChange& c, bool changes, bool& shell_changed);
-  void publish(const MembershipChange& c);
+  void store_and_fetch(const MembershipChange& c, const Occasion& now, bool changes, bool& shell_changed);
   void fit_memory(Phase phase);
 
   Bed& bed_;
   CullingParts& p_;
+  bool unsettled_ = false;  // bodies over several ranks, since interface granules were lost
 };
 
 }  // namespace solidcull

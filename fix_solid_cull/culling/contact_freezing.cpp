@@ -77,12 +77,12 @@ void ContactFreezing::freeze_between_merged() {
   for (int i = 0; i < atoms.owned; ++i) {
     if (!bed_.shell[i].locked) continue;
     const std::int64_t tag = atoms.tag[i];
-    const int own = bed_.groups.key_of(bed_.shell[i].body);
+    const BodyGroups::Key own = bed_.groups.key_of(bed_.shell[i].body);
     histories.for_each_partner(i, [&](std::int64_t partner, const double* history) {
       const int* j = bed_.index.find(partner);
       if (j && just_locked(i) && just_locked(*j)) return;  // freeze() has seen to it
-      const int* ghost = j ? nullptr : bed_.groups.ghost(partner);
-      const int other = j ? (bed_.shell[*j].locked ? bed_.groups.key_of(bed_.shell[*j].body) : 0) : ghost ? *ghost : 0;
+      const BodyGroups::Key* ghost = j ? nullptr : bed_.groups.ghost(partner);
+      const BodyGroups::Key other = j ? (bed_.shell[*j].locked ? bed_.groups.key_of(bed_.shell[*j].body) : 0) : ghost ? *ghost : 0;
       if (other != own || bed_.solid.contacts().contains(tag, partner)) return;
       bed_.solid.freeze(tag, partner, history);
       if (!j) return;
@@ -95,7 +95,7 @@ void ContactFreezing::freeze_between_merged() {
 void ContactFreezing::leave_out_inner_pairs() {
   inner_pairs_listed_ = false;
   if (!bed_.census.something_locked()) return;
-  std::vector<int> body(static_cast<std::size_t>(bed_.atoms.owned + bed_.atoms.ghosts));
+  std::vector<BodyGroups::Key> body(static_cast<std::size_t>(bed_.atoms.owned + bed_.atoms.ghosts));
   for (std::size_t i = 0; i < body.size(); ++i) body[i] = bed_.groups.key_of_atom(static_cast<int>(i));
   bed_.contacts.leave_out_pairs_within(body);
 }

@@ -16,6 +16,9 @@ namespace {
 
 // in a run that starts with an empty box, steps between two tries to find granules to take the scales from
 constexpr int first_granules_every = 50;
+// what a step has brought on any rank: a load change that does not wait, whether neighbour lists are to be built, and whether
+// bodies that stand bear something else
+constexpr unsigned blow_bit = 1, build_bit = 2, load_bit = 4;
 
 }  // namespace
 
@@ -97,6 +100,8 @@ void Culling::set_up_atoms() {
   // a restart file keeps groups: marks of granules that this fix does not hold would hide their contacts
   for (int i = 0; i < bed_.atoms.owned; ++i)
     if (!bed_.shell[i].locked) bed_.atoms.mark_interface(i, false);
+  bed_.see_largest_radius();
+  bed_.ranks.expect_far_out(true);  // the deck may have moved anything anywhere
   if (p_.snapshot.waits()) {
     p_.snapshot.take_up();
     change_.count_restored();
@@ -147,13 +152,13 @@ void Culling::initial_step() {
 
 void Culling::integrate() {
   expect({Phase::stepping}, "integrate");
-  if (!bed_.solid.has_store() || (bed_.ranks.count == 1 && p_.motion.active().empty())) return;
+  if (!bed_.solid.has_store() || (!asked_others_ && p_.motion.active().empty())) return;
   const auto timed = p_.report.time(Part::load);
   p_.motion.kick_and_drift();
   p_.motion.place();
+  hear_of_the_last_step(bed_.run.step);
   // the engine looks at its atoms only: a body that has none would come near something unseen
-  if ((bed_.ranks.count == 1 || p_.motion.is_watched()) && bed_.ranks.any(p_.motion.comes_too_far(0)))
-    bed_.run.ask_for_reneighbouring(bed_.run.step);
+  if (bed_.ranks.count == 1 && p_.motion.comes_too_far(0)) bed_.run.ask_for_reneighbouring(bed_.run.step);
 }
 
 void Culling::take_neighbours() {
@@ -165,7 +170,7 @@ void Culling::take_neighbours() {
   else
     bed_.groups.forget_ghosts();
   // the box followed the granules: stored ones go to the rank that has their place now, before anything comes near them
-  if (bed_.census.something_stored() && bed_.ranks.any(bed_.ranks.subdomain_changed()))
+  if (bed_.census.something_stored() && bed_.ranks.subdomains_changed())
     bed_.run.ask_for_reneighbouring(bed_.run.step + 1);
   if (Invariants::asked()) p_.invariants.check();
 }
@@ -196,30 +201,41 @@ void Culling::take_forces() {
   p_.meter.count_step(p_.report.seconds());
   if (bed_.census.something_locked() || !loads_are_none_) take_loads();
   loads_are_none_ = !bed_.census.something_locked();
-  store_what_feels_walls();
   collect_wakes();
   if (p_.pacing.due(step)) {
     look_.look();
-    if (bed_.ranks.any(bed_.wake.any_here())) p_.ask_for_build(step + 1);
+    p_.motion.tell_next();
   }
+  if (p_.balance.look(step)) p_.ask_for_build(step + 1);
   open_for_insertion(step + 1);
 }
 
 /// What came out of the store because walls may be others feels them now, and goes back: there may be very many, and a look is
-/// some steps away.
-void Culling::store_what_feels_walls() {
-  if (!p_.closure.take_walls_unfelt()) return;
-  const bool asked = bed_.scales.sleeping() && p_.deep.ask_to_store(p_.motion.interface_atoms());
-  if (bed_.ranks.any(asked)) p_.ask_for_build(bed_.run.step + 1);
+/// some steps away. Whether so many go.
+bool Culling::stores_what_feels_walls() {
+  return p_.closure.take_walls_unfelt() && bed_.scales.sleeping() && p_.deep.ask_to_store(p_.motion.interface_atoms());
 }
 
-/// Gentle loads wait for each other; a blow does not.
+/// Gentle loads wait for each other; a blow does not. All ranks learn of it before the next step asks who builds lists.
 void Culling::collect_wakes() {
+  const std::int64_t step = bed_.run.step;
+  const bool stores = stores_what_feels_walls();
   if (!bed_.census.something_locked()) return;
-  const Ranks& ranks = bed_.ranks;
-  const int period = p_.pacing.wake_period();
   const bool blow = p_.motion.largest_excess() > Pacing::blow;
-  if (!p_.pacing.wakes_now(bed_.run.step) && !ranks.any(blow)) return;
+  bool builds = stores || change_.is_unsettled();
+  has_collected_ = blow || p_.pacing.wakes_now(step);
+  if (has_collected_) builds = ask_for_those_that_wake() || p_.motion.comes_too_far(p_.pacing.wake_period() + 1) || builds;
+  if (bed_.ranks.count > 1) {
+    bed_.ranks.begin_any((blow ? blow_bit : 0) | (builds || p_.motion.comes_too_far(1) ? build_bit : 0) |
+                          (p_.motion.differs_from_told() ? load_bit : 0));
+    asked_others_ = true;
+  } else if (builds) {
+    p_.ask_for_build(step + 1);
+  }
+}
+
+/// Whether any does.
+bool Culling::ask_for_those_that_wake() {
   bool waking = false;
   for (const int i : p_.motion.interface_atoms()) {
     const double excess = bed_.shell.take_excess(i);
@@ -227,10 +243,17 @@ void Culling::collect_wakes() {
     bed_.wake.ask_by_load(bed_.atoms.place(i), bed_.scales.wake_up().radius(excess));
     waking = true;
   }
-  std::int64_t asked[2] = {waking || p_.motion.comes_too_far(period + 1), p_.motion.is_fast(period + 1)};
-  ranks.largest(asked, 2);
-  if (asked[0]) p_.ask_for_build(bed_.run.step + 1);
-  p_.motion.watch(asked[1] != 0);
+  return waking;
+}
+
+/// What it has brought on other ranks.
+void Culling::hear_of_the_last_step(std::int64_t next_build) {
+  if (!asked_others_) return;
+  asked_others_ = false;
+  const unsigned anywhere = bed_.ranks.end_any();
+  if ((anywhere & blow_bit) && !has_collected_) ask_for_those_that_wake();
+  if (anywhere & load_bit) p_.motion.tell_next();
+  if (anywhere & (blow_bit | build_bit)) p_.ask_for_build(next_build);
 }
 
 void Culling::finish_step() {
@@ -247,6 +270,7 @@ void Culling::write_outputs() {
 }
 
 void Culling::end_run() {
+  hear_of_the_last_step(bed_.run.step + 1);
   p_.walls.remember_walls();
   if (bed_.solid.has_store()) p_.run_end.tell();
   if (phase_ == Phase::stepping) phase_ = Phase::between_runs;  // after `run 0` the first step is still to come, if `pre no`

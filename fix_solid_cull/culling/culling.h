@@ -96,9 +96,11 @@ class Culling {
   void find_scales();
   void refuse_what_lies_too_far() const;
   void take_loads();
-  void store_what_feels_walls();
+  bool stores_what_feels_walls();
   void tell_uneven_ranks();
   void collect_wakes();
+  bool ask_for_those_that_wake();
+  void hear_of_the_last_step(std::int64_t next_build);
   void open_for_insertion(std::int64_t step);
 
   CullingParts p_;
@@ -108,6 +110,8 @@ class Culling {
   BetweenRuns between_{p_, change_, look_};
   Phase phase_ = Phase::between_runs;
   bool loads_are_none_ = false;  // nothing was culled when they were taken last
+  bool asked_others_ = false;    // what this step has brought on other ranks is on its way
+  bool has_collected_ = false;   // in this step, what wakes here
   std::string told_;             // the last line about ranks
 };
 

@@ -24,6 +24,7 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       shown(bed),
       meshes(bed, shown),
       claims(bed),
+      balance(bed),
       meter(bed),
       report(bed, motion, meter),
       run_end(bed, meter, report),

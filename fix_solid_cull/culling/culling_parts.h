@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "balance.h"
 #include "bed.h"
 #include "body_meshes.h"
 #include "body_motion.h"
@@ -68,6 +69,7 @@ struct CullingParts {
   ShownBed shown;
   BodyMeshes meshes;
   DeckClaims claims;
+  Balance balance;
 
   WorkMeter meter;
   Report report;

@@ -154,26 +154,22 @@ class DeepGranules::Surroundings {
   std::vector<ShellClosure::Foreign> of_shell_;
   SphereCells small_others_;  // around bodies of few stored granules
   std::vector<Extent> others_;
-  int largest_ = 0;
+  BodyGroups::Key largest_ = 0;
   std::vector<Box> opened_;
 };
 
-std::size_t DeepGranules::store(bool locked_now, bool membership_changes, const PutAway& put_away) {
-  const bool asked = bed_.ranks.any(locked_now || asked_);
+std::size_t DeepGranules::store(const Occasion& now, const PutAway& put_away) {
   asked_ = false;
-  if (!asked && (!bed_.scales.sleeping() || ++builds_without_storing_ < builds_between_storing)) return 0;
+  if (!now.locked_now && !now.asked && (!bed_.scales.sleeping() || ++builds_without_storing_ < builds_between_storing)) return 0;
   builds_without_storing_ = 0;
-  // the highest tag must stay an atom: new atoms are numbered from it
-  std::int64_t highest = 0;
-  for (int i = 0; i < bed_.atoms.owned; ++i) highest = std::max<std::int64_t>(highest, bed_.atoms.tag[i]);
-  bed_.ranks.largest(&highest, 1);
-  if (!locked_now && !bed_.scales.sleeping()) return 0;
+  if (!now.locked_now && !bed_.scales.sleeping()) return 0;
 
   const Surroundings surroundings(*this);
   std::vector<int> deep;
   stay_near_ = 0;
   for (int i = bed_.atoms.owned - 1; i >= 0; --i) {
-    if (!bed_.shell[i].locked || !may_leave_its_walls(i) || bed_.atoms.tag[i] == highest) continue;
+    // the highest tag must stay an atom: new atoms are numbered from it
+    if (!bed_.shell[i].locked || !may_leave_its_walls(i) || bed_.atoms.tag[i] >= now.highest) continue;
     if (surroundings.near(i))
       ++stay_near_;
     else
@@ -181,7 +177,7 @@ std::size_t DeepGranules::store(bool locked_now, bool membership_changes, const 
   }
   leave_out_near_meshes(deep);
   // where nothing else changes, a few wait for more
-  if (!membership_changes && static_cast<double>(deep.size()) < store_share * bed_.atoms.owned) return 0;
+  if (!now.membership_changes && static_cast<double>(deep.size()) < store_share * bed_.atoms.owned) return 0;
   return put_away(deep, [&](int i, const Sphere& there) { return surroundings.near(i, there); });
 }
 

@@ -24,9 +24,15 @@ class DeepGranules {
 
   /// At a look: whether so many interface granules might go that it is worth a rebuild. Local.
   bool ask_to_store(const std::vector<int>& interface_atoms);
-  /// `locked_now`: something was locked in this change. `membership_changes`: atoms come and go for other reasons too; else a few
-  /// wait for more. Returns how many went. Collective, after ShellClosure::share().
-  std::size_t store(bool locked_now, bool membership_changes, const PutAway& put_away);
+  bool asked() const { return asked_; }
+  struct Occasion {
+    bool locked_now;          ///< something was locked in this change
+    bool asked;               ///< some rank has asked_to_store()
+    bool membership_changes;  ///< atoms come and go for other reasons too; else a few wait for more
+    std::int64_t highest;     ///< tag of an atom on any rank
+  };
+  /// Returns how many went. Local, after ShellClosure::share().
+  std::size_t store(const Occasion& now, const PutAway& put_away);
 
  private:
   class Surroundings;

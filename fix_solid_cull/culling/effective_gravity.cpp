@@ -17,7 +17,7 @@ void EffectiveGravity::watch_bodies(bool at_once) {
     for (const auto& [number, b] : bed_.solid.bodies().bodies())
       if (b.grounded && bed_.scales.wake_up().gravity_changed(b.pose.turned_to_frame(g), b.felt_known ? b.felt : gravity_then_,
                                                               static_cast<double>(b.mass.count), turns_))
-        bed_.wake.ask_body(bed_.groups.key_of(number));
+        bed_.wake.ask_body(number);
   for (const ActiveBody& a : motion_.active()) watch(a, g, at_once);
 }
 
@@ -28,7 +28,7 @@ void EffectiveGravity::watch(const ActiveBody& a, const Vec3& g, bool at_once) {
   SolidBody& b = *a.body;
   const double granules = b.motion.mass() * static_cast<double>(b.mass.count) / b.mass.mass;
   const auto wakes_if = [&](bool changed) {
-    if (changed) bed_.wake.ask_body(bed_.groups.key_of(a.number));
+    if (changed) bed_.wake.ask_body(a.number);
   };
   if (b.grounded) {
     b.feel_first(b.pose.turned_to_frame(g));

@@ -64,14 +64,15 @@ void Grounding::let_go() {
 
 // ------------------------------------------------------------------------------------------------------------ a look
 
-/// Over all ranks a body that spans them is one: which of its parts touch walls.
-std::set<int> Grounding::keys_of_held_spanning_bodies() const {
-  if (bed_.ranks.count == 1) return {};
-  std::vector<int> keys;
-  for (const auto& [number, body] : bed_.solid.bodies().bodies())
-    if (body.mass.held > 0 && bed_.groups.spans(number)) keys.push_back(bed_.groups.key_of(number));
-  keys = bed_.ranks.gather(keys);
-  return std::set<int>(keys.begin(), keys.end());
+/// Of bodies that span ranks: which have a part that walls hold.
+std::vector<char> Grounding::held_over_ranks() const {
+  std::vector<char> held;
+  for (std::size_t p = 0; p < bed_.groups.spanning_parts(); ++p) {
+    const SolidBody* const part = bed_.groups.part(p);
+    held.push_back(part && part->mass.held > 0);
+  }
+  bed_.groups.unite(held, [](char& whole, char other) { whole |= other; });
+  return held;
 }
 
 bool Grounding::may_be_let_go(int number, const SolidBody& body, bool held) const {
@@ -97,15 +98,17 @@ bool Grounding::is_at_rest(const SolidBody& body, const ActiveBody& loads, const
          body.twist.at(body.pose.to_world(body.mass.centre())).norm() + (spins_on_the_spot ? 0.0 : turns) < slow;
 }
 
-void Grounding::update() {
-  const std::set<int> spanning_held = keys_of_held_spanning_bodies();
+std::vector<char> Grounding::update() {
+  const std::vector<char> held_over_all = held_over_ranks();
+  std::vector<char> grounds(held_over_all.size(), 0);
   FlatMap<const ActiveBody*> loads;
   for (const ActiveBody& a : motion_.active()) loads[a.number] = &a;
   FlatMap<int> only_atom;  // of bodies of one granule
   for (const int i : motion_.interface_atoms())
     if (bed_.solid.bodies().body(bed_.shell[i].body).is_one_granule()) only_atom[bed_.shell[i].body] = i;
   for (auto& [number, body] : bed_.solid.bodies_in_motion()) {
-    const bool held = body.mass.held > 0 || spanning_held.count(bed_.groups.key_of(number));
+    const int over_ranks = bed_.groups.spanning(number);
+    const bool held = over_ranks < 0 ? body.mass.held > 0 : held_over_all[static_cast<std::size_t>(over_ranks)] != 0;
     if (body.grounded) {
       if (may_be_let_go(number, body, held)) to_let_go_.insert(number);
       continue;
@@ -117,6 +120,10 @@ void Grounding::update() {
       continue;
     }
     if (++looks_at_rest_[number] < looks_to_ground) continue;
+    if (over_ranks >= 0) {
+      grounds[static_cast<std::size_t>(over_ranks)] = 1;
+      continue;
+    }
     // a body of one granule has moved as the granule alone would: it is culled only now that it stands
     if (one && body.pose != Pose()) {
       bed_.shell.to_world_frame(*one, body.pose);
@@ -125,10 +132,15 @@ void Grounding::update() {
     }
     bed_.solid.ground(number, true);
   }
+  // a body that turns may rest for one of its ranks first
+  bed_.groups.unite(grounds, [](char& whole, char other) { whole |= other; });
+  for (std::size_t p = 0; p < grounds.size(); ++p)
+    if (grounds[p] && bed_.groups.part(p)) bed_.solid.ground(bed_.groups.body_of_part(p), true);
+  return grounds;
 }
 
 void Grounding::share_out_loads() {
-  std::vector<double> weights(bed_.groups.spanning_bodies(), 0.0);
+  std::vector<double> weights(bed_.groups.spanning_parts(), 0.0);
   std::vector<std::pair<const ActiveBody*, double>> sums;
   for (const ActiveBody& a : motion_.active()) {
     const Sum* mean = a.stands ? mean_extra_load_.find(a.number) : nullptr;
@@ -136,7 +148,7 @@ void Grounding::share_out_loads() {
     sums.emplace_back(&a, bed_.solid.weigh_wall_loads(a.number, mean->value));
     if (a.spanning >= 0) weights[static_cast<std::size_t>(a.spanning)] += sums.back().second;
   }
-  if (!weights.empty()) bed_.ranks.sum(weights.data(), static_cast<int>(weights.size()));
+  bed_.groups.unite(weights, [](double& whole, double other) { whole += other; });
   for (const auto& [a, sum] : sums)
     bed_.solid.share_out_wall_loads(a->number, a->spanning >= 0 ? weights[static_cast<std::size_t>(a->spanning)] : sum);
 }

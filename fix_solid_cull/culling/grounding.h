@@ -19,9 +19,10 @@ class Grounding : public BodyFollower, public StoreFollower {
   Grounding(Bed& bed, const BodyMotion& motion, const WallSurvey& walls) : bed_(bed), motion_(motion), walls_(walls) {}
 
   /// At each look: bodies at rest at walls that stand still are grounded; those that the walls might not hold any more wait to be
-  /// let go. Collective.
-  void update();
-  /// Which elements bear what presses on a body: those that bear the body. Collective; each look ends with it.
+  /// let go. Which bodies over several ranks were grounded, by BodyGroups::spanning(). Among the ranks of each of these.
+  std::vector<char> update();
+  /// Which elements bear what presses on a body: those that bear the body. Each look ends with it. Among the ranks of
+  /// each body.
   void share_out_loads();
   /// Bodies that were to be let go are. When their granules at walls can come back. Local.
   void let_go();
@@ -40,7 +41,7 @@ class Grounding : public BodyFollower, public StoreFollower {
   struct Sum {
     Vec3 value = Vec3::Zero();
   };
-  std::set<int> keys_of_held_spanning_bodies() const;
+  std::vector<char> held_over_ranks() const;
   bool may_be_let_go(int number, const SolidBody& body, bool held) const;
   bool is_at_rest(const SolidBody& body, const ActiveBody& loads, const int* only_atom) const;
 

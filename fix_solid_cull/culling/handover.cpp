@@ -1,6 +1,7 @@
 #include "handover.h"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 namespace solidcull {
@@ -26,35 +27,70 @@ std::vector<std::int64_t> Handover::stored_elsewhere() {
   return tags;
 }
 
+/// What has gone past all neighbours waits for another change, or is lost with its atom.
+bool Handover::find_leaving() {
+  bed_.arrivals.clear();
+  leaving_.clear();
+  if (bed_.ranks.count == 1) return false;
+  const std::vector<int> neighbours = bed_.ranks.neighbours();
+  const auto goes_to = [&](const Vec3& place) -> Leaving* {
+    const int owner = bed_.ranks.owner(place);
+    if (owner == bed_.ranks.me || !std::binary_search(neighbours.begin(), neighbours.end(), owner)) return nullptr;
+    return &leaving_[owner];
+  };
+  const Atoms& atoms = bed_.atoms;
+  for (int i = 0; i < atoms.owned; ++i) {
+    if (!bed_.shell[i].locked || !bed_.run.keeps(atoms.place(i))) continue;  // the engine drops it on the way
+    if (Leaving* const to = goes_to(atoms.place(i))) to->atoms.push_back(atoms.tag[i]);
+  }
+  for (const std::int64_t tag : stored_elsewhere())
+    if (Leaving* const to = goes_to(bed_.solid.in_world(*bed_.solid.store().find(tag)))) to->stored.push_back(tag);
+  for (auto& [rank, to] : leaving_) std::sort(to.atoms.begin(), to.atoms.end());
+  return !leaving_.empty();
+}
+
 /// They leave this rank's part of their bodies; contacts with what stays are kept.
-void Handover::leave(const std::vector<std::int64_t>& atoms, const std::vector<std::int64_t>& stored) {
-  std::vector<std::int64_t> leaving = atoms;
-  leaving.insert(leaving.end(), stored.begin(), stored.end());
+void Handover::leave() {
+  Leaving all;
+  for (const auto& [rank, to] : leaving_) {
+    all.atoms.insert(all.atoms.end(), to.atoms.begin(), to.atoms.end());
+    all.stored.insert(all.stored.end(), to.stored.begin(), to.stored.end());
+  }
+  std::sort(all.atoms.begin(), all.atoms.end());
+  std::sort(all.stored.begin(), all.stored.end());
+  std::vector<std::int64_t> leaving = all.atoms;
+  leaving.insert(leaving.end(), all.stored.begin(), all.stored.end());
   std::vector<GranuleMass> masses;
   for (const std::int64_t tag : leaving) masses.push_back(bed_.masses(tag));
-  for (const std::int64_t tag : atoms) bed_.shell.leaves_rank(bed_.index.at(tag));
+  for (const std::int64_t tag : all.atoms) bed_.shell.leaves_rank(bed_.index.at(tag));
   std::vector<double> record;
-  for (const std::int64_t tag : stored) bed_.solid.bring_back(tag, record);
+  for (const std::int64_t tag : all.stored) bed_.solid.bring_back(tag, record);
   for (std::size_t k = 0; k < leaving.size(); ++k) bed_.solid.unlock(leaving[k], masses[k]);
   for (const std::int64_t tag : leaving) bed_.solid.leave_rank(tag);
   bed_.split_bodies();
 }
 
-bool Handover::send_home() {
-  bed_.arrivals.clear();
-  if (bed_.ranks.count == 1) return false;
-  std::vector<std::int64_t> atoms;
-  for (int i = 0; i < bed_.atoms.owned; ++i) {
-    if (!bed_.shell[i].locked || bed_.ranks.owns(bed_.atoms.place(i))) continue;
-    if (bed_.run.keeps(bed_.atoms.place(i))) atoms.push_back(bed_.atoms.tag[i]);  // else the engine drops it on the way
+void Handover::send_home() {
+  const std::vector<int> neighbours = bed_.ranks.neighbours();
+  for (const int rank : neighbours) {
+    const auto to = leaving_.find(rank);
+    std::vector<double> numbers;
+    if (to != leaving_.end()) numbers = parcels_.pack(to->second.stored, to->second.atoms);
+    bed_.ranks.send(rank, numbers.data(), numbers.size() * sizeof(double));
   }
-  std::sort(atoms.begin(), atoms.end());
-  const std::vector<std::int64_t> stored = stored_elsewhere();
-  if (!bed_.ranks.any(!atoms.empty() || !stored.empty())) return false;
-  const std::vector<double> numbers = bed_.ranks.gather(parcels_.pack(stored, atoms));
-  leave(atoms, stored);
-  parcels_.take_up(parcels_.unpack(numbers.data(), numbers.size(), bed_.solid.contacts().width()));
-  return true;
+  if (!leaving_.empty()) leave();
+  leaving_.clear();
+  std::vector<std::vector<double>> came;  // parcels point into them
+  std::vector<Parcel> parcels;
+  for (const int rank : neighbours) {
+    const std::vector<char> bytes = bed_.ranks.receive(rank);
+    came.emplace_back(bytes.size() / sizeof(double));
+    if (bytes.empty()) continue;
+    std::memcpy(came.back().data(), bytes.data(), bytes.size());
+    for (Parcel& p : parcels_.unpack(came.back().data(), came.back().size(), bed_.solid.contacts().width()))
+      parcels.push_back(std::move(p));
+  }
+  parcels_.take_up(parcels);
 }
 
 std::size_t Handover::take_over() {
@@ -90,7 +126,7 @@ bool Handover::forget_lost() {
       if (!present.contains(b.tag) && bed_.solid.bodies().body_of(b.tag) && !bed_.solid.store().contains(b.tag))
         lost.push_back(b);
   }
-  if (!bed_.ranks.any(!lost.empty())) return false;
+  if (lost.empty()) return false;
   bed_.index.index(bed_.atoms);
   for (const LostGranule& b : lost) bed_.solid.unlock(b.tag, b.granule);
   for (const LostGranule& b : lost) bed_.solid.thaw(b.tag);

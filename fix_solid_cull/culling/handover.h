@@ -15,8 +15,10 @@ class Handover : public BodyFollower {
  public:
   Handover(Bed& bed, Parcels& parcels) : bed_(bed), parcels_(parcels) {}
 
-  /// At the end of a membership change. True if something went. Collective.
-  bool send_home();
+  /// At the end of a membership change: whether something here is another rank's. Local.
+  bool find_leaving();
+  /// It goes there; called where something goes on any rank. Collective.
+  void send_home();
   /// After the engine's exchange: interface granules that have come find their bodies. Those that were announced and did not
   /// come went farther than to the next rank, and the engine has lost them: returns how many. InternalError for one that was not
   /// announced. Local.
@@ -25,8 +27,7 @@ class Handover : public BodyFollower {
   // --- granules that have left the box, or were deleted
   /// The engine is given its atoms: what is in the shell now. Local.
   void remember();
-  /// Those that are not there any more leave their bodies. True if there were any, on any rank; then bodies are to be settled
-  /// anew. Collective.
+  /// Those that are not there any more leave their bodies. True if there were any; then bodies are to be settled anew. Local.
   bool forget_lost();
   void release_memory() { before_.shrink_to_fit(); }
 
@@ -40,12 +41,16 @@ class Handover : public BodyFollower {
   std::vector<std::int64_t> stored_elsewhere();
 
  private:
-  void leave(const std::vector<std::int64_t>& atoms, const std::vector<std::int64_t>& stored);
+  struct Leaving {
+    std::vector<std::int64_t> atoms, stored;  // tags, ascending
+  };
+  void leave();
 
   Bed& bed_;
   Parcels& parcels_;
   std::vector<LostGranule> before_;      // interface granules of this rank when the engine was last given its atoms
   std::vector<LostGranule> on_the_way_;  // announced by another rank, and lost
+  std::map<int, Leaving> leaving_;           // by the rank where they go
   std::map<int, Pose> at_home_;          // frames of the store when their granules were last compared with the subdomain
 };
 

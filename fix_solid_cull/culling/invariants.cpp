@@ -35,7 +35,7 @@ void Invariants::check_shell_is_closed() const {
   if (!bed_.census.several_bodies()) return;
   for (int i = 0; i < atoms.owned; ++i) {
     if (!bed_.shell[i].locked) continue;
-    const int own = bed_.groups.key_of(bed_.shell[i].body);
+    const BodyGroups::Key own = bed_.groups.key_of(bed_.shell[i].body);
     bed_.stored.for_each_near(
         atoms.sphere(i), 0.0,
         [&](const Resident& g) {

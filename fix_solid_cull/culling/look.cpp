@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "numbers.h"
 #include "word_sum.h"
@@ -19,18 +21,18 @@ void Look::look() {
   const auto timed = p_.report.time(Part::look);
   const std::int64_t step = bed_.run.step;
   check_numbers(bed_.atoms);
-  const bool any_culled = bed_.ranks.any(!p_.motion.interface_atoms().empty() || bed_.solid.store().size() > 0);
+  const bool any_culled = bed_.census.something_locked();
   p_.gravity.watch();
-  std::int64_t in_bodies[2] = {0, static_cast<std::int64_t>(bed_.solid.locked())};
+  std::int64_t waking = 0;
   for (const auto& [number, body] : bed_.solid.bodies().bodies())
-    if (bed_.wake.asks_body(bed_.groups.key_of(number))) in_bodies[0] += body.mass.count;
-  bed_.ranks.sum(in_bodies, 2);
-  p_.pacing.see_waking_bodies(in_bodies[0], in_bodies[1], step);
+    if (bed_.wake.asks_body(number)) waking += body.mass.count;
+  bed_.ranks.sum(&waking, 1);
+  p_.pacing.see_waking_bodies(waking, bed_.census.locked(), step);
   if (p_.pacing.waits_for_calm(step)) p_.pacing.see_energy(p_.survey.kinetic_energy_of_exterior(), step);
   const bool may_cull = p_.pacing.may_cull(step) && !p_.gravity.turns();
   if (may_cull || any_culled) see_walls(false);
   chosen_ = survey(may_cull, any_culled);
-  judge(may_cull);
+  if (judge(may_cull)) p_.ask_for_build(step + 1);
   p_.pacing.schedule(step, bed_.census.something_locked(), bed_.census.something_stored());
 }
 
@@ -48,16 +50,13 @@ Proposal Look::survey(bool may_cull, bool any_culled) {
   const Patience patience = p_.pacing.patience(bed_.census.something_locked());
   surface_drawn_ = false;
   Proposal proposal;
-  std::int64_t candidates[2] = {0, bed_.atoms.owned};  // of so many
+  std::int64_t candidates = 0;
   if (may_cull)
-    candidates[0] = p_.survey.find_calm(patience, proposal);
+    candidates = p_.survey.find_calm(patience, proposal);
   else
     p_.survey.forget_calm();
-  bed_.ranks.sum(candidates, 2);
   const bool live = bed_.scales.needs_surface();
-  const double few = (live ? Pacing::worth_share : Pacing::worth_watching) * static_cast<double>(candidates[1]);
-  const bool some_candidates = candidates[0] > 0 && static_cast<double>(candidates[0]) >= few;
-  if (!some_candidates && !any_culled) {
+  if (!any_culled && !are_worth_choosing(candidates)) {
     p_.survey.leave_out_unsteady(patience, proposal);
   } else if (!live) {
     p_.survey.leave_out_unsteady(patience, proposal);
@@ -71,54 +70,70 @@ Proposal Look::survey(bool may_cull, bool any_culled) {
     p_.survey.leave_out_unsteady(patience, proposal);
     p_.cover.wake_exposed();
   }
-  if (bed_.ranks.any(!proposal.chosen.empty())) p_.survey.tie(proposal);
+  if (p_.survey.some_chosen_near(proposal)) p_.survey.tie(proposal);
   p_.meter.see_awake(p_.survey.count_awake(patience, proposal));
   return proposal;
 }
 
+/// Where nothing is culled yet, a few are left alone. Collective.
+bool Look::are_worth_choosing(std::int64_t candidates) const {
+  std::int64_t all[2] = {candidates, bed_.atoms.owned};
+  bed_.ranks.sum(all, 2);
+  const double few =
+      (bed_.scales.needs_surface() ? Pacing::worth_share : Pacing::worth_watching) * static_cast<double>(all[1]);
+  return all[0] > 0 && static_cast<double>(all[0]) >= few;
+}
+
 void Look::ground_and_press() {
-  p_.grounding.update();
-  if (bed_.ranks.any(p_.motion.stale())) {
-    bed_.index.index(bed_.atoms);  // they were sorted since membership changed
-    bed_.groups.settle();
+  const std::vector<char> grounded_over_ranks = p_.grounding.update();
+  const bool stale = p_.motion.stale();
+  if (stale) bed_.index.index(bed_.atoms);  // they were sorted since membership changed
+  bed_.groups.settle_grounded(stale, grounded_over_ranks);
+  if (stale) {
     p_.motion.refresh_in_step();
     p_.motion.give_velocities();
   }
   p_.grounding.share_out_loads();
-  const bool asked = p_.deep.ask_to_store(p_.motion.interface_atoms());
-  if (bed_.ranks.any(p_.grounding.lets_go() || asked)) p_.ask_for_build(bed_.run.step + 1);
+  p_.deep.ask_to_store(p_.motion.interface_atoms());
 }
 
-/// Is it worth a rebuild of the neighbour lists, and did culling pay since the last look?
-void Look::judge(bool may_cull) {
+/// Is it worth a rebuild of the neighbour lists, and did culling pay since the last look? Whether something is to wake, on any
+/// rank.
+bool Look::judge(bool may_cull) {
   const std::int64_t step = bed_.run.step, restored = bed_.solid.ledger().granules_restored();
-  const Ranks& ranks = bed_.ranks;
-  std::int64_t counts[3] = {static_cast<std::int64_t>(chosen_.chosen.size()), p_.survey.exterior_here(),
-                            static_cast<std::int64_t>(chosen_.overdue_tags.size())};
-  ranks.sum(counts, 3);
-  const std::int64_t chosen = counts[0], exterior = counts[1], overdue = counts[2];
-  const bool many = static_cast<double>(chosen) >= Pacing::worth_share * static_cast<double>(exterior);
-  if (chosen > 0 && (many || overdue > 0)) p_.ask_for_build(step + 1);
-  if (ranks.any(!chosen_.joins.empty())) p_.ask_for_build(step + 1);
-  const std::int64_t restored_here = restored - restored_then_;
-  restored_then_ = restored;
+  const std::int64_t restored_here = restored - std::exchange(restored_then_, restored);
+  enum { chosen, exterior, overdue, builds, wakes, interface_granules, interior_granules, restored_anywhere, atoms, numbers };
+  std::int64_t all[numbers] = {};
+  all[chosen] = static_cast<std::int64_t>(chosen_.chosen.size());
+  all[exterior] = p_.survey.exterior_here();
+  all[overdue] = static_cast<std::int64_t>(chosen_.overdue_tags.size());
+  all[builds] = !chosen_.joins.empty() || p_.grounding.lets_go() || p_.deep.asked();
+  all[wakes] = bed_.wake.any_here();
+  all[interface_granules] = static_cast<std::int64_t>(p_.motion.interface_atoms().size());
+  all[interior_granules] = static_cast<std::int64_t>(bed_.solid.store().size());
+  all[restored_anywhere] = restored_here;
+  all[atoms] = bed_.atoms.owned;
+  bed_.ranks.sum(all, numbers);
+  const bool many = static_cast<double>(all[chosen]) >= Pacing::worth_share * static_cast<double>(all[exterior]);
+  if (all[builds] || (all[chosen] > 0 && (many || all[overdue] > 0))) p_.ask_for_build(step + 1);
   if (!p_.pacing.judges(may_cull)) {
     p_.pacing.forget_work();
-    return;
+    return all[wakes] != 0;
   }
-  std::int64_t work[4] = {static_cast<std::int64_t>(p_.motion.interface_atoms().size()),
-                          static_cast<std::int64_t>(bed_.solid.store().size()), restored_here, bed_.atoms.owned};
-  ranks.sum(work, 4);
-  const Pacing::Verdict verdict = p_.pacing.judge({work[0], work[1], work[3], work[2], chosen, exterior, surface_drawn_}, step);
-  if (verdict.wait == 0) return;
+  const Pacing::Verdict verdict =
+      p_.pacing.judge({all[interface_granules], all[interior_granules], all[atoms], all[restored_anywhere], all[chosen],
+                       all[exterior], surface_drawn_},
+                      step);
+  if (verdict.wait == 0) return all[wakes] != 0;
   p_.pacing.see_wait(verdict.wait, p_.survey.kinetic_energy_of_exterior(), step);
   if (verdict.give_back) {
     bed_.wake.ask_all();
     p_.ask_for_build(step + 1);
   }
   if (verdict.tell)
-    bed_.run.say("among " + std::to_string(exterior) + " granules too few can be culled for it to pay; trying again every " +
+    bed_.run.say("among " + std::to_string(all[exterior]) + " granules too few can be culled for it to pay; trying again every " +
                  std::to_string(verdict.wait * bed_.scales.look_every()) + " steps or more");
+  return all[wakes] != 0;
 }
 
 void Look::granules_may_change() {

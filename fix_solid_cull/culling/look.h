@@ -35,8 +35,9 @@ class Look {
 
  private:
   Proposal survey(bool may_cull, bool any_culled);
+  bool are_worth_choosing(std::int64_t candidates) const;
   void ground_and_press();
-  void judge(bool may_cull);
+  bool judge(bool may_cull);
   std::uint64_t sum_of_granules() const;
 
   Bed& bed_;

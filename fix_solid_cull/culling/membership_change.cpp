@@ -39,7 +39,7 @@ void MembershipChange::free_what_wakes() {
   if (wakes_.none()) return;
   std::set<int> whole;  // bodies of this rank that wake as a whole
   for (const auto& b : bed_.solid.bodies().bodies())
-    if (wakes_.all || wakes_.wakes_body(bed_.groups.key_of(b.first))) whole.insert(b.first);
+    if (wakes_.all || wakes_.wakes_body(b.first)) whole.insert(b.first);
   const Atoms& atoms = bed_.atoms;
   for (int i = 0; i < atoms.owned; ++i)
     if (bed_.shell[i].locked && (whole.count(bed_.shell[i].body) || wakes_.in_ball(atoms.place(i), 0))) {
@@ -109,7 +109,7 @@ void MembershipChange::change_bodies() {
   bed_.groups.settle();
   p_.freezing.freeze_between_merged();
   bed_.solid.turn_frozen();
-  bed_.census.count_bodies();
+  bed_.census.expect_several();
 }
 
 /// Contacts go back to the engine.

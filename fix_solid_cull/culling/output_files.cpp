@@ -61,11 +61,11 @@ const std::map<int, InterfaceMesh>& OutputFiles::ask_meshes() {
 
 /// Each body's mesh on rank 0, by key, where the meshes of this rank are `here`: each rank sends its parts, and those of one body
 /// are united in `parts`. Nothing elsewhere.
-std::map<int, const InterfaceMesh*> OutputFiles::whole_meshes(const std::map<int, InterfaceMesh>& here,
-                                                              std::map<int, InterfaceMesh>& parts) {
+std::map<BodyGroups::Key, const InterfaceMesh*> OutputFiles::whole_meshes(const std::map<int, InterfaceMesh>& here,
+                                                              std::map<BodyGroups::Key, InterfaceMesh>& parts) {
   const auto timed = report_.time(Part::mesh);
   struct Head {
-    int key;
+    BodyGroups::Key key;
     std::size_t bytes;
   };
   std::vector<Head> heads;
@@ -80,12 +80,12 @@ std::map<int, const InterfaceMesh*> OutputFiles::whole_meshes(const std::map<int
     heads = bed_.ranks.gather_on_root(heads);
     bytes = bed_.ranks.gather_on_root(bytes);
   }
-  std::map<int, const InterfaceMesh*> whole;
+  std::map<BodyGroups::Key, const InterfaceMesh*> whole;
   if (bed_.ranks.me != 0) return whole;
-  std::map<int, int> parts_of;
+  std::map<BodyGroups::Key, int> parts_of;
   for (const Head& h : heads) ++parts_of[h.key];
   for (const auto& body : here) ++parts_of[bed_.groups.key_of(body.first)];
-  const auto add = [&](int key, const std::string& part) {
+  const auto add = [&](BodyGroups::Key key, const std::string& part) {
     InterfaceMesh mesh = InterfaceMesh::from_bytes(part, bed_.scales.voxel(), bed_.scales.closing());
     const auto there = parts.find(key);
     if (there == parts.end())
@@ -94,7 +94,7 @@ std::map<int, const InterfaceMesh*> OutputFiles::whole_meshes(const std::map<int
       there->second.merge(std::move(mesh));
   };
   for (const auto& [body, mesh] : here) {
-    const int key = bed_.groups.key_of(body);
+    const BodyGroups::Key key = bed_.groups.key_of(body);
     if (parts_of[key] == 1)
       whole[key] = &mesh;
     else
@@ -110,8 +110,8 @@ std::map<int, const InterfaceMesh*> OutputFiles::whole_meshes(const std::map<int
 }
 
 void OutputFiles::write_meshes(const std::string& file) {
-  std::map<int, InterfaceMesh> parts;
-  const std::map<int, const InterfaceMesh*> whole = whole_meshes(ask_meshes(), parts);
+  std::map<BodyGroups::Key, InterfaceMesh> parts;
+  const std::map<BodyGroups::Key, const InterfaceMesh*> whole = whole_meshes(ask_meshes(), parts);
   const auto timed = report_.time(Part::files);
   on_root("mesh", [&] {
     const std::string ending = file.substr(file.size() - 4);
@@ -126,7 +126,7 @@ void OutputFiles::write_meshes(const std::string& file) {
       return;
     }
     TriangleMesh all;
-    std::vector<int> body;
+    std::vector<std::int64_t> body;
     for (const auto& w : whole) {
       const TriangleMesh part = w.second->triangles();
       const auto first = static_cast<std::uint32_t>(all.vertices.size());
@@ -146,7 +146,8 @@ void OutputFiles::write_bed(const std::string& file) {
     Triple x, v;
     double radius;
     std::int64_t tag;
-    int type, state, body;
+    BodyGroups::Key body;
+    int type, state;
   };
   std::vector<Row> rows;
   const Atoms& atoms = bed_.atoms;
@@ -155,13 +156,13 @@ void OutputFiles::write_bed(const std::string& file) {
     const GranuleState state = !e.locked      ? GranuleState::exterior
                                : e.excess > 1 ? GranuleState::waking
                                               : GranuleState::interface_;
-    rows.push_back({triple(atoms.place(i)), triple(atoms.velocity(i)), atoms.radius[i], atoms.tag[i], atoms.type[i],
-                    static_cast<int>(state), static_cast<int>(bed_.shell.labels()[i])});
+    rows.push_back({triple(atoms.place(i)), triple(atoms.velocity(i)), atoms.radius[i], atoms.tag[i],
+                    static_cast<BodyGroups::Key>(bed_.shell.labels()[i]), atoms.type[i], static_cast<int>(state)});
   }
   bed_.solid.store().for_each([&](const Resident& g) {
     const Vec3 x = bed_.solid.in_world(g);
     rows.push_back({triple(bed_.run.wrapped(x)), triple(bed_.solid.bodies().body(g.body).twist.at(x)), g.radius, g.tag,
-                    bed_.solid.store().get(g.tag).type, static_cast<int>(GranuleState::interior), bed_.groups.key_of(g.body)});
+                    bed_.groups.key_of(g.body), bed_.solid.store().get(g.tag).type, static_cast<int>(GranuleState::interior)});
   });
   rows = bed_.ranks.gather_on_root(rows);
   on_root("bed", [&] {

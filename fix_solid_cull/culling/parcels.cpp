@@ -109,6 +109,14 @@ std::vector<double> Parcels::pack(const std::vector<std::int64_t>& stored,
     bed_.solid.store().record(tag, record);
     granule(bed_.solid.store().get(tag), static_cast<double>(record.size()));
     granules.numbers(record.data(), record.size());
+    std::vector<WallLoad> loads;
+    bed_.solid.wall_loads().for_each_of(tag, [&](const WallLoad& load) { loads.push_back(load); });
+    granules.number(static_cast<double>(loads.size()));
+    for (const WallLoad& load : loads) {
+      granules.numbers({double(load.mesh), double(load.element)});
+      granules.vector(load.force);
+      granules.vector(load.torque);
+    }
   }
   for (const std::int64_t tag : interface_tags) granule(bed_.interface_granule(bed_.index.at(tag)), Parcel::no_record);
   Writer edges;
@@ -164,6 +172,14 @@ std::vector<Parcel> Parcels::unpack(const double* numbers, std::size_t n, std::s
       if (g.length != Parcel::no_record) {
         g.layout = layout.at(static_cast<std::size_t>(g.layout));
         g.record = in.numbers(static_cast<std::size_t>(g.length));
+        for (std::size_t w = in.count(); w > 0; --w) {
+          WallLoad load;
+          load.mesh = static_cast<int>(in.whole());
+          load.element = static_cast<int>(in.whole());
+          load.force = in.vector();
+          load.torque = in.vector();
+          g.wall_loads.push_back(load);
+        }
       }
       p.granules.push_back(g);
     }
@@ -288,6 +304,7 @@ void Parcels::take_granule(std::int64_t tag, const Taken& t) {
     s.body = at.body;
     s.load_change = to.pose.turned_to_frame(from.pose.turned_to_world(s.load_change));
     bed_.solid.add_stored(bed_.solid.as_stored(s), g.record, g.length);
+    bed_.solid.add_wall_loads(tag, at.body, g.wall_loads);
   } else if (i && bed_.shell[*i].body == 0) {
     bed_.shell.arrives(*i, at);
   } else {

@@ -26,6 +26,7 @@ struct Parcel {
   struct Granule : StoredGranule {
     const double* record = nullptr;  ///< of an interior granule; none of an interface granule
     int length = 0;
+    std::vector<WallLoad> wall_loads;  ///< of an interior granule that was put away at walls; none out of a file
   };
   struct Edge {
     std::int64_t low, high;
@@ -47,8 +48,7 @@ class Parcels {
   /// width: numbers of a contact history. Local.
   std::vector<Parcel> unpack(const double* numbers, std::size_t n, std::size_t width);
 
-  /// Each rank takes the granules whose places it owns, with the motion that they have in their bodies, and ties them together
-  /// anew. Collective.
+  /// What was sent to this rank is its own, with the motion that it has in its bodies, and is tied together anew. Collective.
   void take_up(const std::vector<Parcel>& parcels) {
     begin_taking();
     take(parcels.data(), parcels.size());

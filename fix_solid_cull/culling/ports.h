@@ -28,7 +28,7 @@ inline Triple triple(const Vec3& v) { return {v[0], v[1], v[2]}; }
 inline Vec3 vec(const Triple& t) { return vec(t.data()); }
 
 /// The granules that are atoms in the engine, as views of its arrays: the owned ones first, then ghosts. Views hold for one hook;
-/// take_out() and put_back() renew them. Local, but for publish_counts().
+/// take_out() and put_back() renew them. Local, but for what says otherwise.
 class Atoms {
  public:
   virtual ~Atoms() = default;
@@ -101,9 +101,10 @@ class Atoms {
   virtual std::string layout_text(int layout) const = 0;
   virtual int layout_from_text(const std::string& text) = 0;
 
-  /// The engine learns how many atoms there are; `returned`: that came out of the store (negative: went in), over all ranks, so
-  /// that it misses none. Collective.
-  virtual void publish_counts(std::int64_t returned) = 0;
+  /// The engine learns how many atoms there are over all ranks; `returned`: that came out of the store (negative: went in), over
+  /// all ranks, so that it misses none; whether the map by tags is too small for what some rank has. All ranks say so alike.
+  virtual void publish_counts(std::int64_t returned, std::int64_t atoms, bool map_too_small) = 0;
+  virtual bool map_is_too_small() const = 0;  ///< for what this rank has
   /// So many more atoms, over all ranks, have come out of the store as publish_counts() has told: until then. Local.
   virtual void count_more(std::int64_t returned) = 0;
   virtual void sort_soon() = 0;  ///< many atoms are new: the engine should sort them
@@ -175,7 +176,7 @@ class Contacts {
   /// Force (N) on owned atom i by owned atom j with this history (nullptr: none).
   virtual Vec3 force_on_first(int i, int j, const double* history) = 0;
   /// Pairs of atoms with the same body number (0: none) are taken out of the neighbour lists.
-  virtual void leave_out_pairs_within(const std::vector<int>& body_of_atom) = 0;
+  virtual void leave_out_pairs_within(const std::vector<std::int64_t>& body_of_atom) = 0;
 };
 
 /// An owned granule within the skin of a wall, or, where a mesh stands still, within half of it.
@@ -238,6 +239,13 @@ class Ranks {
   virtual void sum(std::int64_t* numbers, int n) const = 0;
   virtual void largest(double* numbers, int n) const = 0;
   virtual void largest(std::int64_t* numbers, int n) const = 0;
+  /// Bits that are set on any rank: asked for now, known when the step has gone on. One question at a time. Collective.
+  virtual void begin_any(unsigned bits) const = 0;
+  virtual unsigned end_any() const = 0;
+
+  /// Between two ranks that both know of it: messages come in the order in which they were sent. The sender does not wait.
+  virtual void send(int rank, const void* bytes, std::size_t n) const = 0;
+  virtual std::vector<char> receive(int rank) const = 0;
 
   /// False where one rank owns a box without periodic sides: exchange() gives nothing then.
   virtual bool has_neighbours() const = 0;
@@ -245,9 +253,27 @@ class Ranks {
   virtual void follow_box() {}
   /// Subdomains may have moved: reads them anew, on all ranks. Local.
   virtual void update() = 0;
-  virtual bool subdomain_changed() const = 0;
+  /// Since then, of any rank: all say the same. Local.
+  virtual bool subdomains_changed() const = 0;
   /// Whether this rank's subdomain holds the place (periodic images wrapped).
-  virtual bool owns(const Vec3& place) const = 0;
+  virtual bool owns(const Vec3& place) const { return owner(place) == me; }
+  virtual int owner(const Vec3& place) const = 0;
+  /// This rank's subdomain (m).
+  virtual Box own() const = 0;
+  /// Where the box is cut along each axis, its ends included (m); how near two cuts may be. Local, alike on all ranks.
+  virtual std::array<std::vector<double>, 3> cuts() const = 0;
+  virtual double thinnest() const = 0;
+  /// The cuts are these from here on; the engine sends its atoms where they belong now, which is no farther than a neighbour. All
+  /// ranks say so alike, while membership changes.
+  virtual void move_cuts(const std::array<std::vector<double>, 3>& to) = 0;
+  /// Ranks along a way from any rank to the one that is farthest from it, over their borders.
+  virtual int hops() const = 0;
+  /// Whether a place is farther outside of this rank's subdomain than granules get between two neighbour builds.
+  virtual bool is_far_out(const Vec3& place) const = 0;
+  /// Rows that ranks exchange may be so from here on, and all ranks are neighbours; all ranks say so alike. Local.
+  virtual void expect_far_out(bool on) = 0;
+  /// Ranks that may own what has left this rank's subdomain, ascending; each of them has this one among its own. Local.
+  virtual std::vector<int> neighbours() const = 0;
   /// Shifts by which periodic images of a place near this rank may differ, the zero shift first (m).
   virtual const std::vector<Vec3>& image_shifts() const = 0;
 

@@ -35,7 +35,7 @@ void Report::count_totals() {
   const Ledger& ledger = bed_.solid.ledger();
   const bool open = bed_.solid.has_store();
   const RunWork so_far = meter_.so_far();
-  double sums[14] = {bed_.atoms.owned - interface_granules,
+  double sums[15] = {bed_.atoms.owned - interface_granules,
                      interface_granules,
                      open ? static_cast<double>(bed_.solid.store().size()) : 0.0,
                      bodies,
@@ -48,11 +48,12 @@ void Report::count_totals() {
                      static_cast<double>(ledger.granules_that_moved()),
                      so_far.exterior,
                      so_far.interface,
-                     so_far.interior};
-  bed_.ranks.sum(sums, 14);
+                     so_far.interior,
+                     static_cast<double>(ledger.carves())};
+  bed_.ranks.sum(sums, 15);
   double largest[2] = {motion_.largest_excess(), watch_.total()};
   bed_.ranks.largest(largest, 2);
-  totals_ = {sums[0],    sums[1],    sums[2], sums[3], sums[4], sums[5], sums[6], static_cast<double>(ledger.carves()),
+  totals_ = {sums[0],    sums[1],    sums[2], sums[3], sums[4], sums[5], sums[6], sums[14],
              largest[0], largest[1], sums[7], sums[8]};
   rests_again_ = {sums[9], sums[10]};
   spent_ = {sums[11], sums[12], sums[13]};

@@ -176,7 +176,7 @@ class Shell : public FollowsAtoms {
   }
 
   /// Number of its body over all ranks, 0 of an exterior granule: what f_ID shows of atom i.
-  void label(int i, int key) { labels_[i] = key; }
+  void label(int i, std::int64_t key) { labels_[i] = static_cast<double>(key); }
   double* labels() { return labels_.data(); }
   const double* labels() const { return labels_.data(); }
 

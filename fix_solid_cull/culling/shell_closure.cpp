@@ -33,7 +33,7 @@ void ShellClosure::share() {
   struct Row {
     Triple at;
     double radius;
-    int body;
+    BodyGroups::Key body;
     bool stands;
   };
   std::vector<Row> rows;
@@ -48,7 +48,6 @@ void ShellClosure::share() {
 
 ShellClosure::Overlapped ShellClosure::by_new_granules() const {
   Overlapped found;
-  if (!bed_.ranks.any(some_made_)) return found;
   struct Row {
     Triple at;
     double radius;
@@ -72,7 +71,10 @@ ShellClosure::Overlapped ShellClosure::by_new_granules() const {
   cells.build(std::move(made), 2 * bed_.scales.diameter());
   for (int i = 0; i < atoms.owned; ++i)
     if (bed_.shell.locked(i) && cells.any_near(atoms.sphere(i), 0)) found.places.push_back(atoms.place(i));
-  bed_.ranks.largest(&found.in_stored, 1);
+  std::int64_t agreed[2] = {found.in_stored, !found.places.empty()};
+  bed_.ranks.largest(agreed, 2);
+  found.in_stored = agreed[0];
+  found.some = agreed[1] != 0;
   return found;
 }
 
@@ -93,7 +95,8 @@ bool ShellClosure::is_clear(int i) const {
 // granules
 
 struct ShellClosure::Frame {
-  int number, key;
+  int number;
+  BodyGroups::Key key;
   bool stands;
   const Pose* pose;
   Vec3 middle, half;  // of a box around its stored granules, and the gap, in the world

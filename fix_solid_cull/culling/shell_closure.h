@@ -33,7 +33,7 @@ class ShellClosure : public BodyFollower {
   /// An exterior granule or one of a shell, as stored granules of other bodies see it.
   struct Foreign {
     Sphere sphere;
-    int body;     // key; 0: exterior
+    BodyGroups::Key body;  // 0: exterior
     bool stands;  // the body does, and what is stored of it
   };
 
@@ -46,9 +46,11 @@ class ShellClosure : public BodyFollower {
   void was_made(int i) { rows_[i].made = some_made_ = true; }  ///< local
   struct Overlapped {
     std::int64_t in_stored = 0;  ///< tag of a new granule that overlaps a stored one; 0: none does. On all ranks
+    bool some = false;           ///< a new one overlaps a culled one, on any rank
     std::vector<Vec3> places;    ///< of the culled granules of this rank that new ones overlap
   };
-  /// Collective.
+  bool some_made() const { return some_made_; }  ///< on this rank. Local
+  /// Where some were made, on any rank. Collective.
   Overlapped by_new_granules() const;
   void forget_new();  ///< local
 

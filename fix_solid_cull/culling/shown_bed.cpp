@@ -274,7 +274,7 @@ void ShownBed::give_changes() {
   const Atoms& atoms = bed_.atoms;
   bool far = false;
   for (int i = 0; i < atoms.owned && !far && bed_.ranks.count > 1; ++i) far = !bed_.ranks.owns(atoms.place(i));
-  bed_.atoms.publish_counts(0);
+  bed_.census.publish_atoms(0);
   if (bed_.ranks.any(far)) bed_.atoms.send_far();
 }
 

@@ -58,9 +58,7 @@ std::vector<double> Snapshot::write(bool run_begins) {
   bed_.index.index(bed_.atoms);
   const bool store = bed_.solid.has_store();
   Ledger::Counters sums = bed_.solid.ledger().counters();
-  const double carves = sums[Ledger::carves_counter];
   bed_.ranks.sum(sums.data(), Ledger::counters_size);
-  sums[Ledger::carves_counter] = carves;
   std::int64_t stored = store ? static_cast<std::int64_t>(bed_.solid.store().size()) : 0;
   bed_.ranks.sum(&stored, 1);
   std::vector<double> radii = bed_.solid.largest_radius_by_type();
@@ -152,7 +150,7 @@ void Snapshot::read(const std::vector<double>& state, const std::string& file) {
   bed_.run.step = then;
   Ledger::Counters counted{};
   for (int k = 0; k < Ledger::counters_size; ++k)
-    if (bed_.ranks.me == 0 || k == Ledger::carves_counter) counted[k] = h[counters + k];
+    if (bed_.ranks.me == 0) counted[k] = h[counters + k];
   bed_.solid.set_counters(counted);
 
   // the neighbour cut-off is set before the store is taken up: it must know the largest stored radius

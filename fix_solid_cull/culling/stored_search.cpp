@@ -4,12 +4,11 @@
 
 namespace solidcull {
 
-double contact_reach(const BedState& bed) {
+double largest_radius_here(const BedState& bed) {
   double largest = 0;
   for (int i = 0; i < bed.atoms.owned; ++i) largest = std::max(largest, bed.atoms.radius[i]);
-  if (bed.solid.has_store()) largest = std::max(largest, bed.solid.store().largest_radius());
-  bed.ranks.largest(&largest, 1);
-  return 2 * largest + bed.run.skin;
+  for (const double r : bed.solid.largest_radius_by_type()) largest = std::max(largest, r);
+  return bed.solid.has_store() ? std::max(largest, bed.solid.store().largest_radius()) : largest;
 }
 
 }  // namespace solidcull

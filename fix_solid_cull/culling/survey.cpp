@@ -354,6 +354,18 @@ void Survey::choose_asleep(const Patience& patience, Proposal& proposal) {
   }
 }
 
+bool Survey::some_chosen_near(const Proposal& proposal) const {
+  if (bed_.ranks.count == 1) return !proposal.chosen.empty();
+  struct Row {
+    Triple at;
+  };
+  std::vector<Row> rows;
+  const FlatMap<char> chosen = set_of(proposal.chosen);
+  for (int i = 0; i < bed_.atoms.owned && !proposal.chosen.empty(); ++i)
+    if (chosen.contains(bed_.atoms.tag[i])) rows.push_back({triple(bed_.atoms.place(i))});
+  return !bed_.ranks.exchange(rows, contact_reach(bed_)).empty() || !proposal.chosen.empty();
+}
+
 void Survey::tie(Proposal& proposal) {
   const Atoms& atoms = bed_.atoms;
   const int owned = atoms.owned;

@@ -97,6 +97,8 @@ class Survey {
   void choose_asleep(const Patience& patience, Proposal& proposal);
   /// `exterior live`: whoever is in solid state and deep below the surface. Local.
   void choose_deep(const Patience& patience, Cover& cover, Proposal& proposal);
+  /// Whether granules were chosen here, or within reach of this rank's. Collective.
+  bool some_chosen_near(const Proposal& proposal) const;
   /// What ties the chosen to their neighbours; who would make no solid is left out. Local.
   void tie(Proposal& proposal);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "ports.h"
@@ -23,27 +24,27 @@ struct Ball {
   }
 };
 
-/// All that wakes in one reneighbouring.
+/// All that wakes in one reneighbouring, on this rank.
 struct Wakes {
   bool all = false;
-  std::vector<Ball> balls;  ///< of all ranks, with their periodic images
-  std::size_t carves = 0;   ///< balls without their images
-  std::vector<int> bodies;  ///< that wake as a whole, by key, of all ranks
+  std::vector<Ball> balls;  ///< of all ranks, and their periodic images, that reach what this one may hold
+  std::size_t carves = 0;   ///< that were asked for here
+  std::set<int> bodies;     ///< of this rank, that wake as a whole
 
   bool none() const { return !all && balls.empty() && bodies.empty(); }
   bool in_ball(const Vec3& x, double margin) const {
     return std::any_of(balls.begin(), balls.end(), [&](const Ball& b) { return b.holds(x, margin); });
   }
-  bool wakes_body(int key) const { return std::find(bodies.begin(), bodies.end(), key) != bodies.end(); }
+  bool wakes_body(int body) const { return bodies.count(body) != 0; }
 };
 
-/// Collects on this rank; take() gives what all ranks collected, and is empty afterwards.
+/// Collects on this rank; take() gives what concerns this one of all that ranks have collected, and is empty afterwards.
 class WakeRequests {
  public:
   void ask(const Vec3& centre, double radius) { asked_.push_back({triple(centre), radius, false}); }
   /// Its load has changed: where many ask so beside each other, their balls are those of a front.
   void ask_by_load(const Vec3& centre, double radius) { asked_.push_back({triple(centre), radius, true}); }
-  void ask_body(int key) { bodies_.insert(key); }
+  void ask_body(int body) { bodies_.insert(body); }
   void ask_all() { all_ = true; }
   /// A ball around each place, as large as in a front: what touches it wakes too. Where these are a large share of the granules
   /// that are locked, `locked` on this rank, or would take long to compare with them, all wakes. Collective.
@@ -61,43 +62,45 @@ class WakeRequests {
   }
 
   bool any_here() const { return !asked_.empty() || !bodies_.empty(); }  ///< but for ask_all()
-  bool any_at_all() const { return any_here() || all_; }
-  bool asks_body(int key) const { return bodies_.count(key) != 0; }
+  bool asks_all() const { return all_; }
+  bool asks_body(int body) const { return bodies_.count(body) != 0; }
 
-  /// Collective.
-  Wakes take(const Ranks& ranks, const WakeUpLaw& law) {
+  /// all: some rank has asked so; margin: how far from its subdomain what a rank holds may be, and more where it asks whether
+  /// something is near a ball (m). Parts of a body that spans ranks are to be asked for on each of them. Collective.
+  Wakes take(const Ranks& ranks, const WakeUpLaw& law, bool all, double margin) {
     Wakes w;
-    const std::vector<Asked> all = ranks.gather(asked_);
-    asked_.clear();
-    w.carves = all.size();
-    const std::vector<Vec3>& shifts = ranks.image_shifts();
-    const double growth = law.front_growth();
-    const Fronts fronts(growth > 1 ? all : std::vector<Asked>(), shifts, law.front_reach());
-    for (const Asked& a : all) {
-      const double radius = a.by_load && fronts.hold(vec(a.centre)) ? growth * a.radius : a.radius;
-      for (const Vec3& shift : shifts) w.balls.push_back({vec(a.centre) + shift, radius});
-    }
-    w.bodies = ranks.gather(std::vector<int>(bodies_.begin(), bodies_.end()));
-    bodies_.clear();
-    w.all = ranks.any(all_);
+    w.all = all;
+    w.carves = asked_.size();
+    w.bodies = std::exchange(bodies_, {});
     all_ = false;
+    const double growth = law.front_growth();
+    if (growth > 1) {
+      const std::vector<Asked> others = ranks.exchange(asked_, law.front_reach() + margin);
+      const Fronts fronts(asked_, others, law.front_reach());
+      for (Asked& a : asked_)
+        if (a.by_load && fronts.hold(vec(a.at))) a.radius *= growth;
+    }
+    const auto add = [&](const Asked& a) { w.balls.push_back({vec(a.at), a.radius}); };
+    for (const Asked& a : asked_) add(a);
+    for (const Asked& a : ranks.exchange(asked_, law.largest_radius() + margin)) add(a);
+    asked_.clear();
     return w;
   }
 
  private:
   struct Asked {
-    Triple centre;
+    Triple at;
     double radius;
     bool by_load;
   };
   /// Where many wake beside each other by their loads.
   class Fronts {
    public:
-    Fronts(const std::vector<Asked>& all, const std::vector<Vec3>& shifts, double reach) : reach_(reach) {
+    Fronts(const std::vector<Asked>& own, const std::vector<Asked>& others, double reach) : reach_(reach) {
       std::vector<Sphere> places;
-      for (const Asked& a : all)
-        if (a.by_load)
-          for (const Vec3& shift : shifts) places.push_back({vec(a.centre) + shift, 0});
+      for (const auto* some : {&own, &others})
+        for (const Asked& a : *some)
+          if (a.by_load) places.push_back({vec(a.at), 0});
       places_.build(std::move(places), reach_);
     }
     bool hold(const Vec3& x) const {
@@ -115,7 +118,7 @@ class WakeRequests {
   };
 
   std::vector<Asked> asked_;
-  std::set<int> bodies_;  // keys
+  std::set<int> bodies_;  // of this rank
   bool all_ = false;
 };
 

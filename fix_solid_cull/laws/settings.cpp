@@ -99,6 +99,12 @@ const std::map<std::string, Reader>& readers() {
                   {{"exact", [&] { s.restore = Restore::exact; }}, {"refill", [&] { s.restore = Restore::refill; }}});
        }},
       {"voxel", [](Values& v, Settings& s) { s.voxel = v.number("a size in mean diameters, 0.1 to 2", 0.1, true, 2.0); }},
+      {"balance",
+       [](Values& v, Settings& s) {
+         const char* wanted = "a whole number of steps, 1 or more, and the largest work of a rank over the mean, more than 1";
+         s.balance_every = v.whole(wanted, 1);
+         s.balance_threshold = v.number(wanted, 1, false);
+       }},
       {"report",
        [](Values& v, Settings& s) {
          v.one_of("'short' or 'full'",

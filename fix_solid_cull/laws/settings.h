@@ -30,6 +30,8 @@ struct Settings {
   Store store = Store::exact;
   Restore restore = Restore::exact;
   double voxel = 0.5;  ///< in mean diameters
+  int balance_every = 0;         ///< steps between two looks at the work of ranks; 0: cuts between them stay
+  double balance_threshold = 0;  ///< largest work of a rank over the mean from which cuts move
   ReportLength report = ReportLength::brief;
   std::vector<Output> meshes;  ///< interface meshes; the keyword may stand more than once
   std::vector<Output> beds;    ///< the whole bed; likewise

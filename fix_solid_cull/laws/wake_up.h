@@ -51,6 +51,8 @@ struct WakeUpLaw {
   double front_reach() const { return 3 * diameter; }  ///< m: who is beside it
   /// By how much balls are larger there: r0 is two diameters at least.
   double front_growth() const { return std::max(1.0, 2 * diameter / carve_radius); }
+  /// No ball is larger (m).
+  double largest_radius() const { return std::max(1.0, carve_cap) * carve_radius * front_growth(); }
 };
 
 }  // namespace solidcull

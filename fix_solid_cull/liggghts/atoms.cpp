@@ -1,7 +1,5 @@
 #include "atoms.h"
 
-#include <mpi.h>
-
 #include <algorithm>
 #include <cstring>
 
@@ -116,17 +114,17 @@ void EngineAtoms::send_far() {
   renew();
 }
 
-void EngineAtoms::publish_counts(std::int64_t returned) {
-  LAMMPS_NS::bigint here = atom->nlocal;
-  MPI_Allreduce(&here, &atom->natoms, 1, MPI_LMP_BIGINT, MPI_SUM, world);
+/// A command may have made the map anew while granules with higher tags were stored.
+bool EngineAtoms::map_is_too_small() const {
+  const int highest = atom->nlocal ? *std::max_element(atom->tag, atom->tag + atom->nlocal) : 0;
+  return atom->map_style && highest >= atom->get_map_size();
+}
+
+void EngineAtoms::publish_counts(std::int64_t returned, std::int64_t atoms, bool map_too_small) {
+  atom->natoms = atoms;
   if (output->thermo) engine::expect_atoms(*output->thermo, static_cast<long>(returned));
-  // a command may have made the map anew while granules with higher tags were stored
-  const int highest_here = atom->nlocal ? *std::max_element(atom->tag, atom->tag + atom->nlocal) : 0;
-  int highest = 0;
-  MPI_Allreduce(&highest_here, &highest, 1, MPI_INT, MPI_MAX, world);
-  const bool outgrown = atom->map_style && highest >= atom->get_map_size();
-  if (outgrown) atom->map_init();
-  if (!map_cleared_ && !outgrown) return;
+  if (map_too_small) atom->map_init();
+  if (!map_cleared_ && !map_too_small) return;
   atom->nghost = 0;
   atom->map_set();
   map_cleared_ = false;
@@ -137,8 +135,7 @@ void EngineAtoms::publish_counts(std::int64_t returned) {
 void EngineAtoms::count_more(std::int64_t returned) {
   atom->natoms += returned;
   if (output->thermo) engine::expect_atoms(*output->thermo, static_cast<long>(returned));
-  const int highest_here = atom->nlocal ? *std::max_element(atom->tag, atom->tag + atom->nlocal) : 0;
-  if (!atom->map_style || !map_cleared_ || highest_here >= atom->get_map_size()) return;
+  if (!atom->map_style || !map_cleared_ || map_is_too_small()) return;
   atom->map_set();
   map_cleared_ = false;
 }

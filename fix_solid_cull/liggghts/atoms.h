@@ -41,7 +41,8 @@ class EngineAtoms : public Atoms, protected LAMMPS_NS::Pointers {
   int layouts() const override { return records_.layouts(); }
   std::string layout_text(int layout) const override { return records_.layout_text(layout); }
   int layout_from_text(const std::string& text) override { return records_.layout_from_text(text); }
-  void publish_counts(std::int64_t returned) override;
+  void publish_counts(std::int64_t returned, std::int64_t atoms, bool map_too_small) override;
+  bool map_is_too_small() const override;
   void count_more(std::int64_t returned) override;
   void sort_soon() override;
 

@@ -40,7 +40,7 @@ void EngineContacts::forget_neighbours() {
 }
 
 /// `neigh_modify exclude` would do it, at a test for every candidate pair: neighbour builds take 1.7 times as long with it.
-void EngineContacts::leave_out_pairs_within(const std::vector<int>& body) {
+void EngineContacts::leave_out_pairs_within(const std::vector<std::int64_t>& body) {
   LAMMPS_NS::NeighList* list = force->pair->list;
   LAMMPS_NS::NeighList* histories = force->pair->listgranhistory;
   const int width = static_cast<LAMMPS_NS::PairGran*>(force->pair)->dnum();

@@ -29,7 +29,7 @@ class EngineContacts : public Contacts, protected LAMMPS_NS::Pointers {
   void clear_histories(int i) override { histories_.clear(i); }
   Vec3 force_on_first(int i, int k) override { return pair_force_.on_first(i, k); }
   Vec3 force_on_first(int i, int j, const double* history) override { return pair_force_.on_first(i, j, history); }
-  void leave_out_pairs_within(const std::vector<int>& body_of_atom) override;
+  void leave_out_pairs_within(const std::vector<std::int64_t>& body_of_atom) override;
 
  private:
   ContactHistories histories_;

@@ -41,6 +41,7 @@ FixSolidCull::FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
     rules_.refuse_what_was_set_up_wrongly();
     if (!atoms_.make_interface_group())
       throw InputError("all 32 groups are taken and interface granules need one: delete a group");
+    box_change_domain = settings.balance_every > 0;  // the engine sets up its messages and meshes anew with each neighbour build
     culling_ =
         std::make_unique<Culling>(Ports{atoms_, contacts_, walls_, insertions_, ranks_, run_, memory_}, settings, atom->ntypes);
   } catch (const InputError& e) {

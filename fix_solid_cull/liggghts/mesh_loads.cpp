@@ -45,7 +45,7 @@ void MeshLoads::connect() {
         names_.emplace_back(fix->id);
         meshes_.emplace_back();
       }
-      meshes_[number] = {fix, stress, reference, !fix->triMesh()->isMoving()};
+      meshes_[number] = {fix, stress, reference, !fix->triMesh()->isMoving(), {}};
     }
   }
 }
@@ -57,7 +57,7 @@ void MeshLoads::contact(FixMeshSurface* fix, int granule, const double* force, c
       if (mesh.fix != fix || !mesh.still || !(l->atom->mask[granule] & fix->groupbit)) continue;
       WallLoad load;
       load.mesh = static_cast<int>(m);
-      load.element = element;
+      load.element = fix->triMesh()->id(element);  // indices are others on another rank, and after elements were exchanged
       load.force = vec(force);
       load.torque = (vec(l->atom->x[granule]) + vec(to_wall) - mesh.reference).cross(load.force);
       l->seen_.push_back({l->atom->tag[granule], load});
@@ -75,16 +75,29 @@ std::vector<WallLoad> MeshLoads::of(std::int64_t tag) {
   return loads;
 }
 
+/// -1: this rank does not have it.
+int MeshLoads::index_of(Mesh& mesh, int element) {
+  LAMMPS_NS::TriMesh& triangles = *mesh.fix->triMesh();
+  if (element < 0) return -1;
+  const std::size_t k = static_cast<std::size_t>(element);
+  if (k >= mesh.last.size()) mesh.last.resize(k + 1, -1);
+  int& last = mesh.last[k];
+  const int count = triangles.sizeLocal() + triangles.sizeGhost();
+  if (last < 0 || last >= count || triangles.id(last) != element) last = triangles.map(element, 0);
+  return last;
+}
+
 void MeshLoads::press(int mesh, int element, const Vec3& force, const Vec3& torque) {
   if (static_cast<std::size_t>(mesh) >= meshes_.size() || !meshes_[mesh].fix) return;  // taken out of the deck since
-  const Mesh& m = meshes_[mesh];
-  if (element < 0 || element >= m.fix->triMesh()->size()) return;
+  Mesh& m = meshes_[static_cast<std::size_t>(mesh)];
   double f[3], t[3];
   set(f, force);
   set(t, torque);
-  auto* on_element = m.fix->triMesh()->prop().getElementProperty<LAMMPS_NS::VectorContainer<double, 3>>("f");
-  for (int d = 0; d < 3; ++d) (*on_element)(element)[d] += f[d];
   m.stress->add_global_external_contribution(f, t);
+  const int i = index_of(m, element);
+  if (i < 0) return;
+  auto* on_element = m.fix->triMesh()->prop().getElementProperty<LAMMPS_NS::VectorContainer<double, 3>>("f");
+  for (int d = 0; d < 3; ++d) (*on_element)(i)[d] += f[d];
 }
 
 }  // namespace solidcull

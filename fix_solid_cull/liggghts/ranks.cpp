@@ -4,17 +4,20 @@
 
 #include <algorithm>
 #include <cstring>
+#include <iterator>
 #include <limits>
 #include <utility>
 
 #include "comm.h"
 #include "domain.h"
+#include "invariants.h"
 #include "neighbor.h"
 
 namespace solidcull {
 namespace {
 
-constexpr int exchange_tag = 7311;  // LIGGGHTS's own messages are done when ours begin, and have other tags
+// LIGGGHTS's own messages have other tags
+constexpr int exchange_tag = 7311, message_tag = 7312;
 
 /// MPI counts rows, so that messages may be larger than 2 GiB.
 class RowType {
@@ -38,6 +41,11 @@ EngineRanks::EngineRanks(LAMMPS_NS::LAMMPS* lmp) : Pointers(lmp) {
   count = comm->nprocs;
 }
 
+EngineRanks::~EngineRanks() {
+  for (Message& m : sent_) MPI_Wait(&m.request, MPI_STATUS_IGNORE);
+  MPI_Wait(&asking_, MPI_STATUS_IGNORE);
+}
+
 bool EngineRanks::any(bool here) const {
   if (count == 1) return here;
   int mine = here, anywhere = 0;
@@ -58,16 +66,46 @@ void EngineRanks::largest(std::int64_t* numbers, int n) const {
   if (count > 1) MPI_Allreduce(MPI_IN_PLACE, numbers, n, MPI_INT64_T, MPI_MAX, world);
 }
 
-/// A side of the box that is not periodic may follow the granules, and the rank at it owns what lies beyond.
-std::array<double, 6> EngineRanks::own_borders() const {
-  constexpr double no_border = std::numeric_limits<double>::infinity();
-  std::array<double, 6> own;
-  for (int d = 0; d < 3; ++d) {
-    const bool periodic = domain->boundary[d][0] == 0;
-    own[d] = !periodic && domain->sublo[d] <= domain->boxlo[d] ? -no_border : domain->sublo[d];
-    own[3 + d] = !periodic && domain->subhi[d] >= domain->boxhi[d] ? no_border : domain->subhi[d];
+void EngineRanks::begin_any(unsigned bits) const {
+  asked_ = bits;
+  answer_ = bits;
+  if (count > 1) MPI_Iallreduce(&asked_, &answer_, 1, MPI_UNSIGNED, MPI_BOR, world, &asking_);
+}
+
+unsigned EngineRanks::end_any() const {
+  MPI_Wait(&asking_, MPI_STATUS_IGNORE);
+  return std::exchange(answer_, 0u);
+}
+
+void EngineRanks::forget_sent() const {
+  for (auto m = sent_.begin(); m != sent_.end();) {
+    int done = 0;
+    MPI_Test(&m->request, &done, MPI_STATUS_IGNORE);
+    m = done ? sent_.erase(m) : std::next(m);
   }
-  return own;
+}
+
+void EngineRanks::send(int rank, const void* bytes, std::size_t n) const {
+  forget_sent();
+  const char* const from = static_cast<const char*>(bytes);
+  sent_.push_back({std::vector<char>(from, from + n), MPI_REQUEST_NULL});
+  // as words, so that messages may be larger than 2 GiB; what is left over of the last one is sent along
+  Message& m = sent_.back();
+  const std::size_t words = n / sizeof(double) + 1;
+  m.bytes.resize(words * sizeof(double));
+  m.bytes.back() = static_cast<char>(words * sizeof(double) - n);
+  MPI_Isend(m.bytes.data(), static_cast<int>(words), MPI_DOUBLE, rank, message_tag, world, &m.request);
+}
+
+std::vector<char> EngineRanks::receive(int rank) const {
+  MPI_Status status;
+  MPI_Probe(rank, message_tag, world, &status);
+  int words = 0;
+  MPI_Get_count(&status, MPI_DOUBLE, &words);
+  std::vector<char> bytes(static_cast<std::size_t>(words) * sizeof(double));
+  MPI_Recv(bytes.data(), words, MPI_DOUBLE, rank, message_tag, world, MPI_STATUS_IGNORE);
+  bytes.resize(bytes.size() - static_cast<unsigned char>(bytes.back()));
+  return bytes;
 }
 
 void EngineRanks::follow_box() {
@@ -75,7 +113,8 @@ void EngineRanks::follow_box() {
   if (count > 1 && domain->nonperiodic == shrink_wrapped) domain->reset_box();
 }
 
-/// As every rank knows it: no message is needed.
+/// As every rank knows it: no message is needed. A side of the box that is not periodic may follow the granules, and the rank at
+/// it owns what lies beyond.
 RankGrid EngineRanks::grid() const {
   constexpr double no_border = std::numeric_limits<double>::infinity();
   const double* const splits[3] = {comm->xsplit, comm->ysplit, comm->zsplit};
@@ -106,9 +145,10 @@ auto EngineRanks::partners(double reach) const -> const std::vector<Partner>& {
 }
 
 void EngineRanks::update() {
-  own_ = own_borders();
   grid_ = grid();
-  known_ = true;
+  const RankGrid::Cell own{comm->myloc[0], comm->myloc[1], comm->myloc[2]};
+  lo_ = grid_.lo(own);
+  hi_ = grid_.hi(own);
   partners_.clear();
 
   shifts_.assign(1, Vec3::Zero());
@@ -122,17 +162,55 @@ void EngineRanks::update() {
   has_neighbours_ = count > 1 || shifts_.size() > 1;
 }
 
-bool EngineRanks::subdomain_changed() const { return !known_ || own_borders() != own_; }
+bool EngineRanks::subdomains_changed() const {
+  const RankGrid now = grid();
+  return now.cuts != grid_.cuts || now.periods != grid_.periods;
+}
 
-bool EngineRanks::owns(const Vec3& place) const {
+int EngineRanks::owner(const Vec3& place) const {
   double x[3];
   set(x, place);
   domain->remap(x);
+  const RankGrid::Cell cell = grid_.cell_of(vec(x));
+  return comm->grid2proc[cell[0]][cell[1]][cell[2]];
+}
+
+Box EngineRanks::own() const { return {vec(domain->sublo), vec(domain->subhi)}; }
+
+std::array<std::vector<double>, 3> EngineRanks::cuts() const {
+  std::array<std::vector<double>, 3> all = grid().cuts;
   for (int d = 0; d < 3; ++d) {
-    const bool first = domain->sublo[d] <= domain->boxlo[d], last = domain->subhi[d] >= domain->boxhi[d];
-    if ((x[d] < domain->sublo[d] && !first) || (x[d] >= domain->subhi[d] && !last)) return false;
+    all[d].front() = domain->boxlo[d];
+    all[d].back() = domain->boxhi[d];
   }
-  return true;
+  return all;
+}
+
+/// Ghosts come from neighbours alone.
+double EngineRanks::thinnest() const { return neighbor->cutneighmax + 2 * neighbor->skin; }
+
+/// LIGGGHTS keeps them as shares of the box.
+void EngineRanks::move_cuts(const std::array<std::vector<double>, 3>& to) {
+  double* const splits[3] = {comm->xsplit, comm->ysplit, comm->zsplit};
+  for (int d = 0; d < 3; ++d)
+    for (int c = 1; c < comm->procgrid[d]; ++c) splits[d][c] = (to[d][static_cast<std::size_t>(c)] - domain->boxlo[d]) / domain->prd[d];
+  comm->uniform = 0;
+  domain->set_local_box();
+}
+
+int EngineRanks::hops() const { return comm->procgrid[0] + comm->procgrid[1] + comm->procgrid[2] - 3; }
+
+/// Atoms hardly leave their subdomain between two builds; what comes out of a store, or a deck has moved, may be anywhere.
+bool EngineRanks::is_far_out(const Vec3& place) const {
+  const double slack = neighbor->cutneighmax;
+  return count > 1 && ((place.array() < lo_.array() - slack).any() || (place.array() > hi_.array() + slack).any());
+}
+
+std::vector<int> EngineRanks::neighbours() const {
+  std::vector<int> ranks;
+  for (const Partner& p : partners(far_out_ ? std::numeric_limits<double>::infinity() : neighbor->cutneighmax))
+    if (p.rank != me) ranks.push_back(p.rank);
+  return ranks;
 }
 
 void EngineRanks::exchange_bytes(const void* rows, std::size_t n, std::size_t bytes, double width, const Room& room) const {
@@ -141,30 +219,25 @@ void EngineRanks::exchange_bytes(const void* rows, std::size_t n, std::size_t by
   const double rounding = 1e-6 * width;
   const auto is_near_a_border = [&](const Triple& at) {
     for (int d = 0; d < 3; ++d)
-      if (at[d] <= own_[d] + width + rounding || at[d] >= own_[3 + d] - width - rounding) return true;
+      if (at[d] <= lo_[d] + width + rounding || at[d] >= hi_[d] - width - rounding) return true;
     return false;
   };
-  // atoms hardly leave their subdomain between two builds; what comes out of a store, or a deck has moved, may be anywhere
-  const double slack = neighbor->cutneighmax;
-  const auto far_out = [&](const Triple& at) {
-    for (int d = 0; d < 3; ++d)
-      if (at[d] < own_[d] - slack || at[d] > own_[3 + d] + slack) return true;
-    return false;
-  };
-  bool strays = false;
   struct Row {
     std::size_t number;
     Triple at;
   };
   std::vector<Row> near_borders;
+  bool strays = false;
   for (std::size_t r = 0; r < n; ++r) {
     Row row{r, {}};
     std::memcpy(row.at.data(), from + r * bytes, sizeof row.at);
     if (!is_near_a_border(row.at)) continue;
-    strays = strays || far_out(row.at);
+    strays = strays || is_far_out(vec(row.at));
     near_borders.push_back(row);
   }
-  const std::vector<Partner>& all = partners(any(strays) ? std::numeric_limits<double>::infinity() : width + slack);
+  if (Invariants::asked() && !far_out_ && any(strays)) throw InternalError("rows are far outside of their subdomain");
+  const std::vector<Partner>& all =
+      partners(far_out_ ? std::numeric_limits<double>::infinity() : width + neighbor->cutneighmax);
   std::vector<std::vector<char>> out(all.size());
   for (std::size_t p = 0; p < all.size(); ++p)
     for (const Vec3& shift : all[p].shifts)

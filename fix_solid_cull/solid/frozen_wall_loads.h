@@ -15,7 +15,7 @@ namespace solidcull {
 /// The force of one wall element on one granule. SI units, world frame.
 struct WallLoad {
   static constexpr int no_mesh = -1;
-  int mesh = 0, element = 0;   ///< the adapter's numbers; no_mesh: of a wall that reports no load
+  int mesh = 0, element = 0;   ///< the adapter's numbers, on all ranks the same; no_mesh: of a wall that reports no load
   Vec3 force = Vec3::Zero();   ///< on the granule (N)
   Vec3 torque = Vec3::Zero();  ///< of that force about the mesh's point of reference (N m)
 };
@@ -70,6 +70,13 @@ class FrozenWallLoads {
   };
   /// The same of meshes alone, in one row: each step asks for it. Valid until something changes.
   const std::vector<OnMesh>& on_meshes() const;
+  /// Calls visit(load) with each of a granule that was put away.
+  template <class Visit>
+  void for_each_of(std::int64_t tag, Visit visit) const {
+    const int* head = heads_.find(tag);
+    for (int e = head ? *head : none; e != none; e = entries_[static_cast<std::size_t>(e)].next)
+      visit(entries_[static_cast<std::size_t>(e)].load);
+  }
   std::size_t memory_bytes() const;
 
  private:

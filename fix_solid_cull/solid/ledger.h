@@ -48,8 +48,8 @@ class Ledger {
   std::int64_t granules_that_moved() const { return moved_; }  ///< of those
   double energy_added() const { return energy_.value(); }
 
-  /// Counters as numbers for a restart file, and back. Sums over ranks, but for carves, which all ranks count.
-  static constexpr int counters_size = 6, carves_counter = 2;
+  /// Counters as numbers for a restart file, and back: sums over ranks.
+  static constexpr int counters_size = 6;
   using Counters = std::array<double, counters_size>;
   Counters counters() const {
     return {static_cast<double>(locked_),       static_cast<double>(restored_), static_cast<double>(carves_), energy_.value(),

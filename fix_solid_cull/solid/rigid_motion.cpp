@@ -32,6 +32,17 @@ RigidPart RigidPart::granule(double mass, double radius, const Vec3& position, c
   return {mass, position, 0.4 * mass * radius * radius * Eigen::Matrix3d::Identity(), velocity, spin};
 }
 
+void RigidSum::add(const RigidSum& other) {
+  const double all = mass + other.mass;
+  const Vec3 apart = other.centre - centre;
+  const double between = mass * other.mass / all;  // of two points that turn about their common centre
+  inertia += other.inertia + between * (apart.squaredNorm() * Eigen::Matrix3d::Identity() - apart * apart.transpose());
+  angular_momentum += other.angular_momentum + between * apart.cross(other.momentum / other.mass - momentum / mass);
+  centre += other.mass / all * apart;
+  momentum += other.momentum;
+  mass = all;
+}
+
 RigidMotion::RigidMotion(const RigidPart* parts, int count, const FreeAxes& free)
     : free_(free), all_free_(free[0] && free[1] && free[2]) {
   // about the first part's centre and motion, so that nothing is lost to a far origin or a fast frame
@@ -51,6 +62,20 @@ RigidMotion::RigidMotion(const RigidPart* parts, int count, const FreeAxes& free
     inertia += parts[p].inertia + parts[p].mass * (arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose());
     angular_momentum_ += parts[p].inertia * parts[p].spin + parts[p].mass * arm.cross(parts[p].velocity - velocity_);
   }
+  set_inertia(inertia);
+}
+
+RigidMotion::RigidMotion(const RigidSum& sum, const FreeAxes& free)
+    : mass_(sum.mass),
+      centre_(sum.centre),
+      velocity_(sum.momentum / sum.mass),
+      angular_momentum_(sum.angular_momentum),
+      free_(free),
+      all_free_(free[0] && free[1] && free[2]) {
+  set_inertia(sum.inertia);
+}
+
+void RigidMotion::set_inertia(const Eigen::Matrix3d& inertia) {
   if (all_free_) {
     inverse_inertia_ = inverse_of(inertia);
     return;

@@ -30,6 +30,21 @@ struct RigidPart {
   double kinetic_energy() const { return 0.5 * mass * velocity.squaredNorm() + 0.5 * spin.dot(inertia * spin); }
 };
 
+/// Several pieces, tied together: what of them adds up. Momentum (kg m/s) and angular momentum (kg m^2/s) are about their centre
+/// of mass. World frame.
+struct RigidSum {
+  double mass = 0;
+  Vec3 centre = Vec3::Zero();
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  Vec3 momentum = Vec3::Zero(), angular_momentum = Vec3::Zero();
+
+  RigidSum(double m, const Vec3& x, const Eigen::Matrix3d& about_centre, const Vec3& p, const Vec3& turning)
+      : mass(m), centre(x), inertia(about_centre), momentum(p), angular_momentum(turning) {}
+  explicit RigidSum(const RigidPart& part)
+      : RigidSum(part.mass, part.centre, part.inertia, part.mass * part.velocity, part.inertia * part.spin) {}
+  void add(const RigidSum& other);
+};
+
 /// Turning about these world axes is possible; a body that is tied to its own periodic image cannot turn freely.
 using FreeAxes = std::array<bool, 3>;
 
@@ -39,6 +54,7 @@ class RigidMotion {
   /// The rigid body that the parts become when they are tied together: momentum and angular momentum are kept (those about axes
   /// that are not free go to what ties the body). At least one part with mass.
   explicit RigidMotion(const RigidPart* parts, int count, const FreeAxes& free = {true, true, true});
+  explicit RigidMotion(const RigidSum& sum, const FreeAxes& free = {true, true, true});
 
   /// Momentum changes by force (N) and torque about the centre (N m) over dt (s).
   void kick(const Vec3& force, const Vec3& torque, double dt);
@@ -74,6 +90,7 @@ class RigidMotion {
  private:
   Vec3 spin_at(const Eigen::Quaterniond& turned) const { return spin_of(turned, angular_momentum_); }
   Vec3 spin_of(const Eigen::Quaterniond& turned, const Vec3& angular_momentum) const;
+  void set_inertia(const Eigen::Matrix3d& inertia);
   void keep_free_axes();
 
   double mass_ = 0;

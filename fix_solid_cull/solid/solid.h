@@ -183,6 +183,8 @@ class Solid {
   }
 
   // --- walls
+  /// A stored granule came from another rank with these.
+  void add_wall_loads(std::int64_t tag, int body, const std::vector<WallLoad>& loads) { wall_loads_.add(tag, body, loads); }
   double weigh_wall_loads(int body, const Vec3& load) { return wall_loads_.weigh(body, load); }
   void share_out_wall_loads(int body, double sum) { wall_loads_.share_out(body, sum); }
 

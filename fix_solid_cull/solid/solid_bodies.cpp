@@ -80,10 +80,9 @@ void SolidBody::settle() {
   changed = false;
 }
 
-void SolidBody::settle_as_part(const std::vector<RigidPart>& parts, const FreeAxes& free, const Vec3& shift,
-                               double grounded_share) {
+void SolidBody::settle_as_part(const RigidSum& whole, const FreeAxes& free, const Vec3& shift, double grounded_share) {
   if (grounded) grounded_mass = grounded_share * mass.mass;
-  motion = RigidMotion(parts.data(), static_cast<int>(parts.size()), free);
+  motion = RigidMotion(whole, free);
   motion.shift(-shift);
   if (grounded) motion.stop();
   take_twist();

@@ -132,9 +132,9 @@ struct SolidBody {
     spanned = spans_ranks;
   }
   void settle();  ///< its own granules are all there is
-  /// It is a part of the whole that these parts make, `grounded_share` of which was grounded of itself; shift: from this rank's
-  /// image to the one in which the parts are given.
-  void settle_as_part(const std::vector<RigidPart>& parts, const FreeAxes& free, const Vec3& shift, double grounded_share);
+  /// It is a part of this whole, `grounded_share` of which was grounded of itself; shift: from this rank's image to the one in
+  /// which the whole is given.
+  void settle_as_part(const RigidSum& whole, const FreeAxes& free, const Vec3& shift, double grounded_share);
 
   // effective gravity (theory.md#effective-gravity)
   void feel(const Vec3& gravity_in_frame) {

@@ -195,10 +195,17 @@ double largest(const State& a, Vec Granule::*what) {
   return most;
 }
 
+/// SOLIDCULL_GRID in the environment, such as "2 2 2", cuts the box otherwise.
+std::string grid() {
+  const char* const asked = std::getenv("SOLIDCULL_GRID");
+  return asked ? asked : "* * 1";
+}
+
 std::string head(const Bed& bed) {
   return std::string("atom_style granular\natom_modify map array\nboundary ") + (bed.periodic ? "p p f" : "f f f") +
          "\nnewton off\ncommunicate single vel yes\nunits si\n"
-         "processors * * 1\n";
+         "processors " +
+         grid() + "\n";
 }
 
 std::string body(const Bed& bed) {

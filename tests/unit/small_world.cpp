@@ -93,9 +93,34 @@ std::vector<std::vector<char>> Meeting::gather(int rank, const std::string& what
   return all;
 }
 
+void Meeting::post(int from, int to, const void* bytes, std::size_t n) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const char* const first = static_cast<const char*>(bytes);
+  posted_[{from, to}].emplace_back(first, first + n);
+  all_came_.notify_all();
+}
+
+std::vector<char> Meeting::take(int from, int to) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  std::deque<std::vector<char>>& box = posted_[{from, to}];
+  const bool in_time = all_came_.wait_for(lock, std::chrono::duration<double>(seconds_),
+                                          [&] { return !box.empty() || !broken_.empty() || left_.count(from); });
+  if (box.empty()) {
+    if (broken_.empty())
+      broken_ = "rank " + std::to_string(to) + " waited for a message of rank " + std::to_string(from) +
+                (in_time ? ", which ended" : ", and none came");
+    all_came_.notify_all();
+    throw Broken(broken_);
+  }
+  std::vector<char> bytes = std::move(box.front());
+  box.pop_front();
+  return bytes;
+}
+
 void Meeting::leave(int rank) {
   const std::lock_guard<std::mutex> lock(mutex_);
   gone_ = "rank " + std::to_string(rank);
+  left_.insert(rank);
   if (came_ > 0 && broken_.empty()) broken_ = gone_ + " ended while others waited for it";
   all_came_.notify_all();
 }
@@ -134,7 +159,28 @@ void run_on_ranks(const SmallDeck& deck, const std::function<void(SmallWorld&)>&
 SmallRanks::SmallRanks(SmallWorld& world, Meeting* meeting, int rank, int ranks) : world_(world), meeting_(meeting) {
   me = rank;
   count = ranks;
+  const Box& box = world.deck.box;
+  for (int d = 0; d < 3; ++d) {
+    const int n = world.deck.split[static_cast<std::size_t>(d)];
+    for (int c = 0; c < n; ++c) cuts_[static_cast<std::size_t>(d)].push_back(box.lo[d] + c * (box.hi[d] - box.lo[d]) / n);
+    cuts_[static_cast<std::size_t>(d)].push_back(box.hi[d]);
+  }
 }
+
+Box SmallRanks::subdomain(int rank) const {
+  Box own;
+  for (int d = 0; d < 3; ++d) {
+    const std::vector<double>& cuts = cuts_[static_cast<std::size_t>(d)];
+    const int n = static_cast<int>(cuts.size()) - 1;
+    const std::size_t at = static_cast<std::size_t>(rank % n);
+    rank /= n;
+    own.lo[d] = cuts[at];
+    own.hi[d] = cuts[at + 1];
+  }
+  return own;
+}
+
+double SmallRanks::thinnest() const { return 2 * world_.run.skin; }
 
 std::vector<std::vector<char>> SmallRanks::all(const std::string& what, const void* bytes, std::size_t n) const {
   ++collectives;
@@ -174,10 +220,23 @@ void SmallRanks::largest(std::int64_t* numbers, int n) const {
   unite("largest integer", numbers, n, [](std::int64_t a, std::int64_t b) { return std::max(a, b); });
 }
 
+unsigned SmallRanks::end_any() const {
+  unite("bits", &asked_, 1, [](unsigned a, unsigned b) { return a | b; });
+  return asked_;
+}
+
+void SmallRanks::send(int rank, const void* bytes, std::size_t n) const {
+  ++messages;
+  meeting_->post(me, rank, bytes, n);
+}
+
+std::vector<char> SmallRanks::receive(int rank) const { return meeting_->take(rank, me); }
+
 bool SmallRanks::has_neighbours() const { return count > 1 || shifts_.size() > 1; }
 
 void SmallRanks::update() {
-  known_ = world_.run.own;
+  known_.clear();
+  for (int r = 0; r < count; ++r) known_.push_back(subdomain(r));
   const Vec3 edges = world_.run.edges();
   const auto& periodic = world_.run.periodic;
   shifts_.assign(1, Vec3::Zero());
@@ -189,21 +248,39 @@ void SmallRanks::update() {
   }
 }
 
-bool SmallRanks::subdomain_changed() const { return known_.lo != world_.run.own.lo || known_.hi != world_.run.own.hi; }
-
-bool SmallRanks::owns(const Vec3& place) const {
-  const Vec3 x = world_.run.wrapped(place);
-  const Box &own = world_.run.own, &box = world_.run.box;
-  for (int d = 0; d < 3; ++d) {
-    if (x[d] < own.lo[d] && own.lo[d] > box.lo[d]) return false;
-    if (x[d] >= own.hi[d] && own.hi[d] < box.hi[d]) return false;
+bool SmallRanks::subdomains_changed() const {
+  for (int r = 0; r < count; ++r) {
+    const Box now = subdomain(r), &then = known_[static_cast<std::size_t>(r)];
+    if (now.lo != then.lo || now.hi != then.hi) return true;
   }
-  return true;
+  return false;
+}
+
+int SmallRanks::owner(const Vec3& place) const {
+  const Vec3 x = world_.run.wrapped(place);
+  const Box& box = world_.run.box;
+  for (int r = 0; r < count; ++r) {
+    const Box own = subdomain(r);
+    bool holds = true;
+    for (int d = 0; d < 3; ++d)
+      holds = holds && (x[d] >= own.lo[d] || own.lo[d] <= box.lo[d]) && (x[d] < own.hi[d] || own.hi[d] >= box.hi[d]);
+    if (holds) return r;
+  }
+  throw std::logic_error("no rank owns a place");
+}
+
+int SmallRanks::hops() const { return world_.deck.split[0] + world_.deck.split[1] + world_.deck.split[2] - 3; }
+
+std::vector<int> SmallRanks::neighbours() const {
+  std::vector<int> others;
+  for (int r = 0; r < count; ++r)
+    if (r != me) others.push_back(r);
+  return others;
 }
 
 void SmallRanks::exchange_bytes(const void* rows, std::size_t n, std::size_t bytes, double width, const Room& room) const {
   const auto of = all("exchange of rows of " + std::to_string(bytes) + " within " + std::to_string(width), rows, n * bytes);
-  const Box& own = world_.run.own;
+  const Box own = subdomain(me);
   std::vector<char> in;
   for (int rank = 0; rank < count; ++rank)
     for (const Vec3& shift : shifts_) {
@@ -382,9 +459,8 @@ int SmallAtoms::layout_from_text(const std::string& text) {
   return layouts() - 1;
 }
 
-void SmallAtoms::publish_counts(std::int64_t returned) {
-  published = owned;
-  world_.ranks.sum(&published, 1);
+void SmallAtoms::publish_counts(std::int64_t returned, std::int64_t atoms, bool) {
+  published = atoms;
   returned_last = returned;
 }
 
@@ -499,7 +575,7 @@ Vec3 SmallContacts::force_on_first(int i, int j, const double* history) {
   return force(i, j, history && width ? vec(history) : Vec3(Vec3::Zero()), nullptr, 0);
 }
 
-void SmallContacts::leave_out_pairs_within(const std::vector<int>& body) {
+void SmallContacts::leave_out_pairs_within(const std::vector<std::int64_t>& body) {
   SmallAtoms& atoms = world_.atoms;
   for (int i = 0; i < atoms.owned; ++i) {
     if (!body.at(static_cast<std::size_t>(i))) continue;
@@ -755,7 +831,7 @@ SmallWorld::SmallWorld(const SmallDeck& its_deck, Meeting* meeting, int rank, in
   run.dt = deck.dt;
   run.skin = deck.skin;
   run.box = deck.box;
-  run.own = subdomain(rank);
+  run.own = ranks.own();
   run.periodic = deck.periodic;
   run.kept = deck.box;
   for (int d = 0; d < 3; ++d)
@@ -766,18 +842,6 @@ SmallWorld::SmallWorld(const SmallDeck& its_deck, Meeting* meeting, int rank, in
   run.name = "cull";
   if (deck.gravity.isZero(0)) atoms.gravity_bits = 0;
   ranks.update();
-}
-
-Box SmallWorld::subdomain(int rank) const {
-  Box own;
-  const Vec3 edges = deck.box.hi - deck.box.lo;
-  for (int d = 0; d < 3; ++d) {
-    const int n = deck.split[static_cast<std::size_t>(d)], at = rank % n;
-    rank /= n;
-    own.lo[d] = deck.box.lo[d] + at * edges[d] / n;
-    own.hi[d] = at + 1 == n ? deck.box.hi[d] : deck.box.lo[d] + (at + 1) * edges[d] / n;
-  }
-  return own;
 }
 
 double SmallWorld::mass_of(double radius) const { return deck.density * 4.0 / 3.0 * pi * radius * radius * radius; }
@@ -901,7 +965,7 @@ void SmallWorld::borders() {
       if (rank == ranks.me && shift.isZero(0)) continue;
       for (std::size_t k = 0; k < rows.size(); ++k) {
         const Vec3 x = vec(rows[k].x) + shift;
-        if (((run.own.lo - x).array() > reach).any() || ((x - run.own.hi).array() > reach).any()) continue;
+        if (((ranks.own().lo - x).array() > reach).any() || ((x - ranks.own().hi).array() > reach).any()) continue;
         ghosts_.push_back({rank, static_cast<int>(k), shift});
         take_row(atoms.append_ghost(), rows[k], shift);
       }

@@ -5,9 +5,11 @@
 #include <array>
 #include <condition_variable>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <mutex>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -29,6 +31,9 @@ class Meeting {
 
   /// The bytes of all ranks, once all have come with the same `what`. Collective.
   std::vector<std::vector<char>> gather(int rank, const std::string& what, const void* bytes, std::size_t n);
+  /// A message from one rank to another; those between two come in their order. take() waits for one.
+  void post(int from, int to, const void* bytes, std::size_t n);
+  std::vector<char> take(int from, int to);
   /// The rank comes no more.
   void leave(int rank);
 
@@ -51,6 +56,8 @@ class Meeting {
   std::size_t came_ = 0;
   std::uint64_t round_ = 0;
   std::string broken_, gone_;
+  std::set<int> left_;
+  std::map<std::pair<int, int>, std::deque<std::vector<char>>> posted_;  // by from and to
 };
 
 /// What a deck sets, alike on all ranks.
@@ -115,7 +122,8 @@ class SmallAtoms : public Atoms {
   int layouts() const override { return static_cast<int>(texts_.size()); }
   std::string layout_text(int layout) const override { return texts_.at(static_cast<std::size_t>(layout)); }
   int layout_from_text(const std::string& text) override;
-  void publish_counts(std::int64_t returned) override;
+  void publish_counts(std::int64_t returned, std::int64_t atoms, bool map_too_small) override;
+  bool map_is_too_small() const override { return false; }
   void count_more(std::int64_t returned) override;
   void sort_soon() override { sort_asked = true; }
 
@@ -160,7 +168,7 @@ class SmallContacts : public Contacts {
   void clear_histories(int i) override;
   Vec3 force_on_first(int i, int k) override;
   Vec3 force_on_first(int i, int j, const double* history) override;
-  void leave_out_pairs_within(const std::vector<int>& body_of_atom) override;
+  void leave_out_pairs_within(const std::vector<std::int64_t>& body_of_atom) override;
 
   void build();                           ///< rows by brute force
   void add_forces();                      ///< and histories go on by a time step
@@ -241,15 +249,29 @@ class SmallRanks : public Ranks {
   void sum(std::int64_t* numbers, int n) const override;
   void largest(double* numbers, int n) const override;
   void largest(std::int64_t* numbers, int n) const override;
+  void begin_any(unsigned bits) const override { asked_ = bits; }
+  unsigned end_any() const override;
+  void send(int rank, const void* bytes, std::size_t n) const override;
+  std::vector<char> receive(int rank) const override;
   bool has_neighbours() const override;
   void update() override;
-  bool subdomain_changed() const override;
-  bool owns(const Vec3& place) const override;
+  bool subdomains_changed() const override;
+  int owner(const Vec3& place) const override;
+  Box own() const override { return subdomain(me); }
+  std::array<std::vector<double>, 3> cuts() const override { return cuts_; }
+  double thinnest() const override;
+  void move_cuts(const std::array<std::vector<double>, 3>& to) override { cuts_ = to; }
+  Box subdomain(int rank) const;
+  int hops() const override;
+  bool is_far_out(const Vec3&) const override { return false; }  // rows go to all ranks here
+  void expect_far_out(bool) override {}
+  std::vector<int> neighbours() const override;
   const std::vector<Vec3>& image_shifts() const override { return shifts_; }
 
   /// Rows of all ranks, by rank. Collective.
   std::vector<std::vector<char>> all(const std::string& what, const void* bytes, std::size_t n) const;
   mutable int collectives = 0;  ///< so many so far
+  mutable int messages = 0;     ///< so many sent
 
  protected:
   void exchange_bytes(const void* rows, std::size_t n, std::size_t bytes, double width, const Room& room) const override;
@@ -262,7 +284,9 @@ class SmallRanks : public Ranks {
   SmallWorld& world_;
   Meeting* meeting_;
   std::vector<Vec3> shifts_{Vec3::Zero()};
-  Box known_;
+  std::array<std::vector<double>, 3> cuts_;
+  std::vector<Box> known_;  // subdomains of all ranks
+  mutable unsigned asked_ = 0;
 };
 
 class SmallRun : public Run {
@@ -344,7 +368,6 @@ class SmallWorld {
 
   Vec3 momentum() const;          ///< of this rank's atoms
   double kinetic_energy() const;  ///< likewise
-  Box subdomain(int rank) const;
 
  private:
   struct Ghost {

@@ -163,13 +163,13 @@ TEST(Cover, an_interface_granule_that_loses_its_cover_asks_to_wake) {
   cube.parts.motion.refresh();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
-  const std::size_t after_one = cube.parts.bed.wake.take(cube.world.ranks, cube.parts.bed.scales.wake_up()).balls.size();
+  const std::size_t after_one = cube.parts.wakes().balls.size();
   cube.remove_above(5);  // the second: half a diameter is left
   cube.parts.motion.begin_lists();
   cube.parts.motion.refresh();
   cube.parts.cover.draw();
   cube.parts.cover.wake_exposed();
-  const Wakes wakes = cube.parts.bed.wake.take(cube.world.ranks, cube.parts.bed.scales.wake_up());
+  const Wakes wakes = cube.parts.wakes();
   EXPECT_LE(after_one, 9u);  // at most the topmost nine
   // now all nine of them, whoever else
   for (int i = 2; i < 5; ++i)

@@ -25,7 +25,6 @@ struct Block {
     parts.lock(tags);
     parts.motion.refresh();
     number = parts.body_of(1);
-    key = parts.bed.groups.key_of(number);
     window = std::max(parts.bed.scales.look_every(), static_cast<int>(std::ceil(10 * n)));
   }
   SolidBody& body() { return parts.bed.solid.body(number); }
@@ -40,12 +39,12 @@ struct Block {
     world.run.step += window;
     watch();
   }
-  bool asks() const { return parts.bed.wake.asks_body(key); }
+  bool asks() const { return parts.bed.wake.asks_body(number); }
   void tilt(double degrees) { world.deck.gravity = 9.81 * Vec3(std::sin(degrees * degree), 0, -std::cos(degrees * degree)); }
 
   SmallWorld world;
   WorldParts parts;
-  int number, key, window;
+  int number, window;
 };
 
 TEST(EffectiveGravity, a_body_that_stands_wakes_when_gravity_tilts_beyond_its_share) {

@@ -46,7 +46,7 @@ struct Whole {
   std::map<int, Vec3> places;                                      // by tag
   std::map<int, std::vector<double>> numbers;                      // of stored granules
   std::map<std::pair<std::int64_t, std::int64_t>, Vec3> contacts;  // as the lower tag sees it, world frame
-  std::set<int> keys;                                              // of bodies
+  std::set<std::int64_t> keys;                                             // of bodies
   std::vector<int> tags_by_rank[4];
 
   void add(SmallWorld& w, WorldParts& parts) {
@@ -164,13 +164,13 @@ TEST(Handover, granules_go_to_the_rank_that_owns_their_place_and_nothing_is_lost
       block.shift(Vec3(0.031, 0, 0));
       before.add(w, block.parts);
       block.parts.bed.index.index(w.atoms);
-      EXPECT_TRUE(block.parts.handover.send_home());
+      EXPECT_TRUE(block.parts.send_home());
       block.parts.reneighbour();
       after.add(w, block.parts);
       block.parts.bed.census.count_bodies();
       EXPECT_NO_THROW(block.parts.invariants.check());
       block.parts.bed.index.index(w.atoms);
-      EXPECT_FALSE(block.parts.handover.send_home());  // all are at home
+      EXPECT_FALSE(block.parts.send_home());  // all are at home
     });
     EXPECT_EQ(before.interior, 10);
     EXPECT_EQ(before.interface_granules, 14);
@@ -189,11 +189,11 @@ TEST(Handover, what_lags_behind_by_less_than_the_slack_may_wait) {
   run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
     Block block(w, -0.065);  // its last column at -0.0151
     block.parts.bed.index.index(w.atoms);
-    block.parts.handover.send_home();
+    block.parts.send_home();
     block.parts.reneighbour();
     block.shift(Vec3(0.3 * 2 * r, 0, 0));
     block.parts.bed.index.index(w.atoms);
-    EXPECT_FALSE(block.parts.handover.send_home());
+    EXPECT_FALSE(block.parts.send_home());
   });
 }
 
@@ -202,7 +202,7 @@ TEST(Handover, an_interface_granule_that_was_announced_and_does_not_come_has_lef
     Block block(w, -0.06);
     block.shift(Vec3(0.031, 0, 0));
     block.parts.bed.index.index(w.atoms);
-    block.parts.handover.send_home();
+    block.parts.send_home();
     block.parts.handover.remember();
     // the engine takes it along to the next rank only, and drops it where it has gone farther
     for (int i = w.atoms.owned - 1; i >= 0; --i)
@@ -211,7 +211,8 @@ TEST(Handover, an_interface_granule_that_was_announced_and_does_not_come_has_lef
     block.parts.bed.arrivals.for_each_tag([&](std::int64_t tag) { announced.push_back(tag); });
     EXPECT_EQ(announced.empty(), w.ranks.me == 0);
     EXPECT_EQ(block.parts.handover.take_over(), announced.size());
-    EXPECT_TRUE(block.parts.handover.forget_lost());
+    EXPECT_TRUE(w.ranks.any(block.parts.handover.forget_lost()));
+    block.parts.bed.index.index(w.atoms);
     for (const std::int64_t tag : announced) EXPECT_EQ(block.parts.body_of(tag), 0);
     block.parts.bed.groups.settle();
     block.parts.bed.census.count_bodies();
@@ -226,11 +227,12 @@ TEST(Handover, what_leaves_the_box_beside_another_rank_is_announced_to_nobody) {
     block.shift(Vec3(0.031, 0.1, 0));  // half of it is beyond a side of the box, and some of that beside the other rank
     block.parts.bed.index.index(w.atoms);
     block.parts.closure.fetch_from_outside();
-    block.parts.handover.send_home();
+    block.parts.send_home();
     block.parts.handover.remember();
     w.exchange();
     EXPECT_EQ(block.parts.handover.take_over(), 0u);
-    EXPECT_TRUE(block.parts.handover.forget_lost());
+    EXPECT_TRUE(w.ranks.any(block.parts.handover.forget_lost()));
+    block.parts.bed.index.index(w.atoms);
     block.parts.bed.groups.settle();
     block.parts.bed.census.count_bodies();
     EXPECT_NO_THROW(block.parts.invariants.check());
@@ -332,7 +334,7 @@ TEST(Snapshot, what_two_ranks_wrote_is_taken_up_by_any_number_of_ranks) {
   Whole written;
   run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
     Block block(w, -0.03);
-    block.parts.bed.solid.count_carves(3);
+    block.parts.bed.solid.count_carves(3);  // on each of two
     written.add(w, block.parts);
     file.write(w, block.parts);
   });
@@ -346,11 +348,12 @@ TEST(Snapshot, what_two_ranks_wrote_is_taken_up_by_any_number_of_ranks) {
       parts.reneighbour();
       read.add(w, parts);
       EXPECT_NO_THROW(parts.invariants.check());
-      std::int64_t counters[2] = {parts.bed.solid.ledger().granules_locked(), parts.bed.solid.ledger().granules_restored()};
-      w.ranks.sum(counters, 2);
+      const Ledger& ledger = parts.bed.solid.ledger();
+      std::int64_t counters[3] = {ledger.granules_locked(), ledger.granules_restored(), ledger.carves()};
+      w.ranks.sum(counters, 3);
       EXPECT_EQ(counters[0], 24);
       EXPECT_EQ(counters[1], 0);
-      EXPECT_EQ(parts.bed.solid.ledger().carves(), 3);
+      EXPECT_EQ(counters[2], 6);
       EXPECT_EQ(parts.bed.solid.largest_radius_by_type()[1], r);
     });
     expect_alike(read, written);

@@ -253,11 +253,11 @@ const Refusal refusals[] = {
     {"depth 0.8 exterior live", "voxel 0.5 is too coarse for depth 0.8: choose voxel <= depth/2"},
 
     {"deptth 2",
-     "unknown keyword 'deptth': choose from bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, "
+     "unknown keyword 'deptth': choose from balance, bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, "
      "store, "
      "tolerance, voxel"},
     {"calm 3 4",
-     "unknown keyword '4': choose from bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, store, "
+     "unknown keyword '4': choose from balance, bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, store, "
      "tolerance, voxel"},
 };
 
@@ -338,9 +338,9 @@ TEST(CommandPage, names_the_defaults_of_the_code) {
     if (w.empty() || w[0] != "depth") continue;
     expect_same(parse_settings(w), Settings());
     const std::set<std::string> named(w.begin(), w.end());
-    // a number of steps that depends on the deck, and files that are not written: told in words
+    // a number of steps that depends on the deck, cuts that do not move, and files that are not written: told in words
     for (const std::string& k : setting_keywords())
-      EXPECT_TRUE(named.count(k) || k == "every" || k == "mesh" || k == "bed") << "no default for " << k;
+      EXPECT_TRUE(named.count(k) || k == "balance" || k == "every" || k == "mesh" || k == "bed") << "no default for " << k;
     return;
   }
   ADD_FAILURE() << "no line of defaults that begins with depth";

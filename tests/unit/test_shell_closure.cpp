@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "world_parts.h"
@@ -33,7 +34,8 @@ struct Row {
     parts.bed.index.index(world.atoms);
     parts.bed.census.count_bodies();
     parts.closure.share();
-    return parts.deep.store(true, true,
+    const std::int64_t highest = *std::max_element(world.atoms.tag, world.atoms.tag + world.atoms.owned);
+    return parts.deep.store({true, false, true, highest},
                             [&](const std::vector<int>& atoms, const auto&) { return parts.exchange.put_away(atoms); });
   }
   Tags stored() const {

@@ -47,15 +47,25 @@ struct WorldParts : CullingParts {
 
   /// The first half of a membership change: nothing goes to the store or comes out by the shell's closure. Collective.
   void change(Wakes wakes, Proposal proposal) {
+    bed.see_largest_radius();
     exchange.begin_change();
     MembershipChange c(bed, for_change(), std::move(wakes), std::move(proposal));
     bed.index.index(world.atoms);
     c.free_and_lock();
     c.change_bodies();
+    bed.census.count_bodies();
     bed.census.count_stored();
     bed.label_bodies();
     motion.begin_lists();
   }
+  /// What is another rank's goes there; false if nothing is, on any rank. Collective.
+  bool send_home() {
+    const bool some = world.ranks.any(handover.find_leaving());
+    if (some) handover.send_home();
+    return some;
+  }
+  /// All that wakes. Collective.
+  Wakes wakes() { return bed.take_wakes(world.ranks.any(bed.wake.asks_all())); }
   /// Owned granules with these tags are locked; what of them touches is one body. Collective.
   void lock(const std::vector<std::int64_t>& tags) {
     Proposal p;
@@ -91,7 +101,7 @@ struct WorldParts : CullingParts {
     motion.refresh();
   }
   void leave_out() {
-    std::vector<int> body;
+    std::vector<BodyGroups::Key> body;
     for (int i = 0; i < world.atoms.owned + world.atoms.ghosts; ++i) body.push_back(bed.groups.key_of_atom(i));
     world.contacts.leave_out_pairs_within(body);
   }

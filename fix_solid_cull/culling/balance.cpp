@@ -1,0 +1,79 @@
+#include "balance.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "balanced_cuts.h"
+#include "culling_benefit.h"
+
+namespace solidcull {
+namespace {
+
+// of an interface granule, and of a stored one, which costs memory and now and then a look: in exterior granules
+constexpr double interface_work = 1 - CullingBenefit::interface, interior_work = 0.01;
+constexpr int slices = 100;  // along each axis: a sum over ranks stays below a kilobyte
+// a move by less than this share of a subdomain's edge is none
+constexpr double least_move = 1e-3;
+
+/// Calls visit(place, work) for all granules of this rank.
+template <class Visit>
+void for_each_granule(const Bed& bed, Visit visit) {
+  for (int i = 0; i < bed.atoms.owned; ++i) visit(bed.atoms.place(i), bed.shell.locked(i) ? interface_work : 1.0);
+  bed.solid.store().for_each([&](const Resident& g) { visit(bed.solid.in_world(g), interior_work); });
+}
+
+}  // namespace
+
+double Balance::measure() const {
+  double interface_granules = 0;
+  for (int i = 0; i < bed_.atoms.owned; ++i) interface_granules += bed_.shell.locked(i);
+  const double work = bed_.atoms.owned - (1 - interface_work) * interface_granules +
+                      interior_work * static_cast<double>(bed_.solid.store().size());
+  double sum = work, largest = work;
+  bed_.ranks.sum(&sum, 1);
+  bed_.ranks.largest(&largest, 1);
+  return sum > 0 ? largest * bed_.ranks.count / sum : 1.0;
+}
+
+bool Balance::look(std::int64_t step) {
+  const Settings& s = bed_.scales.settings();
+  if (s.balance_every == 0 || bed_.ranks.count == 1 || step % s.balance_every != 0) return false;
+  imbalance_ = measure();
+  due_ = imbalance_ > s.balance_threshold;
+  return due_;
+}
+
+bool Balance::move() {
+  if (!due_) return false;
+  due_ = false;
+  const std::array<std::vector<double>, 3> before = bed_.ranks.cuts();
+  std::array<std::vector<double>, 3> cuts = before;
+  double farthest = 0;  // in subdomains
+  for (int d = 0; d < 3; ++d) {
+    if (before[d].size() <= 2) continue;
+    const double lo = before[d].front(), edge = before[d].back() - lo;
+    std::vector<double> work(slices, 0.0);
+    for_each_granule(bed_, [&](const Vec3& x, double w) {
+      const double at = std::floor((bed_.run.wrapped(x)[d] - lo) / edge * slices);
+      work[static_cast<std::size_t>(std::clamp(at, 0.0, slices - 1.0))] += w;
+    });
+    bed_.ranks.sum(work.data(), slices);
+    cuts[d] = balanced_cuts(before[d], work, bed_.ranks.thinnest());
+    for (std::size_t k = 1; k + 1 < cuts[d].size(); ++k)
+      farthest = std::max(farthest, std::abs(cuts[d][k] - before[d][k]) * static_cast<double>(cuts[d].size() - 1) / edge);
+  }
+  if (farthest < least_move) return false;
+  bed_.ranks.move_cuts(cuts);
+  ++moves_;
+  char text[160];
+  std::snprintf(text, sizeof text, "step %lld: the most loaded rank had %.2f times the mean work; cuts moved by up to %.0f %% of a rank",
+                static_cast<long long>(bed_.run.deck_step()), imbalance_, 100 * farthest);
+  bed_.run.say(text);
+  return true;
+}
+
+}  // namespace solidcull
