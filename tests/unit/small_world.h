@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -241,21 +242,27 @@ class SmallRanks : public Ranks {
   void sum(std::int64_t* numbers, int n) const override;
   void largest(double* numbers, int n) const override;
   void largest(std::int64_t* numbers, int n) const override;
+  std::int64_t sum_before(std::int64_t number) const override;
   bool has_neighbours() const override;
   void update() override;
   bool subdomain_changed() const override;
   bool owns(const Vec3& place) const override;
+  int owner(const Vec3& place) const override;
   const std::vector<Vec3>& image_shifts() const override { return shifts_; }
+  std::unique_ptr<SharedFile> open_to_write(const std::string& file) const override;
 
   /// Rows of all ranks, by rank. Collective.
   std::vector<std::vector<char>> all(const std::string& what, const void* bytes, std::size_t n) const;
-  mutable int collectives = 0;  ///< so many so far
+  mutable int collectives = 0;       ///< so many so far
+  mutable std::size_t delivered = 0;  ///< bytes of rows that others have sent to this rank
 
  protected:
   void exchange_bytes(const void* rows, std::size_t n, std::size_t bytes, double width, const Room& room) const override;
   void gather_bytes(const void* rows, std::size_t n, std::size_t bytes, bool everywhere, const Room& room) const override;
+  void deliver_bytes(const std::vector<Letter>& letters, std::size_t bytes, const RoomFrom& room) const override;
 
  private:
+  bool is_in(const Box& own, const Vec3& place) const;
   template <class Number, class Unite>
   void unite(const char* what, Number* numbers, int n, Unite unite) const;
 
