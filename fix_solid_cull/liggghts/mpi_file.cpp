@@ -28,14 +28,16 @@ int errno_of(int result) {
 
 MpiFile::MpiFile(MPI_Comm ranks, const std::string& file) {
   note(MPI_File_open(ranks, file.c_str(), MPI_MODE_WRONLY, MPI_INFO_NULL, &file_));
-  if (file_ != MPI_FILE_NULL) MPI_File_set_errhandler(file_, MPI_ERRORS_RETURN);
-  // other ranks' view of what the first has written may lag behind
   int me = 0;
   MPI_Comm_rank(ranks, &me);
   MPI_Offset size = 0;
   if (me == 0 && file_ != MPI_FILE_NULL) note(MPI_File_get_size(file_, &size));
+  // what others see of what the first has written may lag behind
   MPI_Bcast(&size, 1, MPI_OFFSET, 0, ranks);
   size_ = static_cast<std::uint64_t>(size);
+  // all have it, or none
+  MPI_Allreduce(MPI_IN_PLACE, &error_, 1, MPI_INT, MPI_MAX, ranks);
+  if (error_) file_ = MPI_FILE_NULL;
 }
 
 MpiFile::~MpiFile() {
