@@ -14,9 +14,9 @@
 
 namespace solidcull {
 
-/// Chunks are dealt out evenly. Round by round each rank reads one of its own, and sends each granule in it to its owner: the rank
-/// that has its atom, or its place. So each chunk is read once, and no rank gets more than is its own. Contacts go with their
-/// granules; those between ranks of which only one has heard so far follow at the end.
+/// Chunks are dealt out evenly. Round by round each rank reads one of its own, and sends each granule in it to its owner: the
+/// rank that has its atom, or its place. So each chunk is read once, and no rank gets more than is its own. Contacts go with
+/// their granules; those between ranks of which only one has heard so far follow at the end.
 class SectionDelivery {
  public:
   SectionDelivery(Bed& bed, Parcels& parcels, SectionReader& section);

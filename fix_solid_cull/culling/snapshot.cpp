@@ -166,10 +166,9 @@ void Snapshot::take_up() {
   bed_.index.index(bed_.atoms);
   if (bed_.ranks.any(bed_.ranks.subdomain_changed())) bed_.ranks.update();
   SectionReader section(bed_.ranks, file_, identity);
-  std::vector<SectionChunk> read;
   const bool as_it_was = static_cast<int>(h[ranks]) == bed_.ranks.count &&
-                         section.parts().size() == static_cast<std::size_t>(bed_.ranks.count) && stands_as_it_was(section, read);
-  const SectionCounts taken = as_it_was ? take_as_it_was(section, read) : SectionDelivery(bed_, parcels_, section).take_all();
+                         section.parts().size() == static_cast<std::size_t>(bed_.ranks.count) && stands_as_it_was(section);
+  const SectionCounts taken = as_it_was ? take_as_it_was(section) : SectionDelivery(bed_, parcels_, section).take_all();
   check_counts(section.counts(), taken);
 }
 
@@ -182,8 +181,8 @@ void Snapshot::check_counts(const SectionCounts& due, const SectionCounts& taken
   const auto is = [](std::int64_t n, std::uint64_t other) { return static_cast<std::uint64_t>(n) == other; };
   if (!is(all[0], due.chunks) || !is(all[1], due.interior) || !is(all[2], due.interface_granules)) throw InputError(damaged);
   if (!is(all[3], due.interior))
-    throw InternalError("of " + std::to_string(due.interior) + " interior granules of the restart file " + std::to_string(all[3]) +
-                        " were taken up");
+    throw InternalError("of " + std::to_string(due.interior) + " interior granules of the restart file " +
+                        std::to_string(all[3]) + " were taken up");
 }
 
 /// Whether this rank holds what is in the parcel.
@@ -195,31 +194,31 @@ bool Snapshot::holds(const Parcel& p) const {
 }
 
 /// Whether each rank holds all that it wrote, and locked atoms that it wrote only. Keeps the chunks that it has read, all but
-/// those of interior granules.
-bool Snapshot::stands_as_it_was(SectionReader& section, std::vector<SectionChunk>& read) const {
+/// those of interior granules, so that they are not read again.
+bool Snapshot::stands_as_it_was(SectionReader& section) const {
   std::int64_t locked = 0;
   for (int i = 0; i < bed_.atoms.owned; ++i) locked += bed_.shell[i].locked;
   bool same = true, moved = false, within = false;  // moved: the borders of the subdomain
   ChunkReader reader(bed_);
+  SectionChunk chunk;
   const std::vector<ChunkPlace> chunks = section.list(static_cast<std::size_t>(bed_.ranks.me));
   for (const ChunkPlace& c : chunks) {
     if (c.kind == SectionChunk::interior_granules) continue;
-    read.emplace_back();
-    if (!section.read(c, read.back())) break;
+    if (!section.read(c, chunk)) break;
     if (c.kind == SectionChunk::part) {
-      const ChunkReader::Head& head = reader.part(read.back());
+      const ChunkReader::Head& head = reader.part(chunk);
       const Box &own = bed_.run.own, &places = head.places;
       moved = head.own.lo != own.lo || head.own.hi != own.hi;
       within = (places.lo.array() >= own.lo.array()).all() && (places.hi.array() < own.hi.array()).all();
     } else {
       locked -= static_cast<std::int64_t>(c.granules);
-      same = same && holds(reader.parcel(read.back()));
+      same = same && holds(reader.parcel(chunk));
     }
+    section.keep(c, std::move(chunk));
   }
   section.agree();
   if (bed_.ranks.any(!same || locked != 0)) return false;
   if (bed_.ranks.count == 1 || !bed_.ranks.any(moved)) return true;
-  SectionChunk chunk;
   for (const ChunkPlace& c : chunks) {
     if (within || !same) break;
     if (c.kind == SectionChunk::interior_granules && section.read(c, chunk)) same = holds(reader.parcel(chunk));
@@ -228,16 +227,12 @@ bool Snapshot::stands_as_it_was(SectionReader& section, std::vector<SectionChunk
   return !bed_.ranks.any(!same);
 }
 
-SectionCounts Snapshot::take_as_it_was(SectionReader& section, std::vector<SectionChunk>& read) {
+SectionCounts Snapshot::take_as_it_was(SectionReader& section) {
   ChunkReader reader(bed_);
   SectionCounts taken;
   SectionChunk chunk;
-  auto known = read.begin();
   for (const ChunkPlace& c : section.list(static_cast<std::size_t>(bed_.ranks.me))) {
-    if (c.kind != SectionChunk::interior_granules)
-      chunk = std::move(*known++);
-    else if (!section.read(c, chunk))
-      break;
+    if (!section.read(c, chunk)) break;
     taken.add(c.kind, c.granules);
     if (c.kind == SectionChunk::part)
       parcels_.begin_as_it_was(*reader.part(chunk).sender);

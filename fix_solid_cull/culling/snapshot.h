@@ -38,10 +38,10 @@ class Snapshot {
   void take_up();
 
  private:
-  bool stands_as_it_was(SectionReader& section, std::vector<SectionChunk>& read) const;
+  bool stands_as_it_was(SectionReader& section) const;
   bool holds(const Parcel& parcel) const;
   void check_counts(const SectionCounts& due, const SectionCounts& taken) const;
-  SectionCounts take_as_it_was(SectionReader& section, std::vector<SectionChunk>& read);
+  SectionCounts take_as_it_was(SectionReader& section);
 
   Bed& bed_;
   Parcels& parcels_;

@@ -215,6 +215,12 @@ std::vector<ChunkPlace> SectionReader::list(std::size_t part) {
 }
 
 bool SectionReader::read(const ChunkPlace& place, SectionChunk& chunk) {
+  const auto kept = kept_.find(place.at);
+  if (kept != kept_.end()) {
+    chunk = std::move(kept->second);
+    kept_.erase(kept);
+    return true;
+  }
   std::vector<char> bytes(place.size);
   if (fetch(begin_ + place.at, bytes.data(), bytes.size()) &&
       chunk.unpack(bytes.data(), bytes.data() + bytes.size()) == bytes.data() + bytes.size() && chunk.kind == place.kind &&

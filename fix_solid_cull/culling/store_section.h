@@ -35,8 +35,10 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "packed_columns.h"
@@ -123,6 +125,8 @@ class SectionReader {
   std::vector<ChunkPlace> list(std::size_t part);
   /// False, and an empty chunk, where something is wrong, see agree(). Local.
   bool read(const ChunkPlace& place, SectionChunk& chunk);
+  /// The next read() of this place gives it again, without the file.
+  void keep(const ChunkPlace& place, SectionChunk&& chunk) { kept_[place.at] = std::move(chunk); }
   /// Throws where any rank found something wrong. Collective.
   void agree();
 
@@ -145,6 +149,7 @@ class SectionReader {
   std::uint64_t begin_ = 0, end_of_chunks_ = 0;  // in the file; counted from there
   SectionCounts counts_;
   std::vector<Part> parts_;
+  std::map<std::uint64_t, SectionChunk> kept_;  // by place
 };
 
 }  // namespace solidcull

@@ -9,8 +9,8 @@
 
 namespace solidcull {
 
-/// Each tag has a home among the ranks, which all know: there whoever has the granule says so, and whoever looks for it asks. What
-/// a rank receives goes with what it has and what it asks for, not with the number of ranks.
+/// Each tag has a home among the ranks, which all know: there whoever has the granule says so, and whoever looks for it asks.
+/// What a rank receives goes with what it has and what it asks for, not with the number of ranks.
 class TagOwners {
  public:
   /// tags: what this rank has. Collective.

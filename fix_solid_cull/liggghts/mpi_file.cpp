@@ -13,14 +13,22 @@ int errno_of(int result) {
   int kind = MPI_ERR_OTHER;
   MPI_Error_class(result, &kind);
   switch (kind) {
-    case MPI_SUCCESS: return 0;
-    case MPI_ERR_NO_SPACE: return ENOSPC;
-    case MPI_ERR_QUOTA: return EDQUOT;
-    case MPI_ERR_NO_SUCH_FILE: return ENOENT;
-    case MPI_ERR_ACCESS: return EACCES;
-    case MPI_ERR_READ_ONLY: return EROFS;
-    case MPI_ERR_BAD_FILE: return ENOENT;
-    default: return EIO;
+    case MPI_SUCCESS:
+      return 0;
+    case MPI_ERR_NO_SPACE:
+      return ENOSPC;
+    case MPI_ERR_QUOTA:
+      return EDQUOT;
+    case MPI_ERR_NO_SUCH_FILE:
+      return ENOENT;
+    case MPI_ERR_ACCESS:
+      return EACCES;
+    case MPI_ERR_READ_ONLY:
+      return EROFS;
+    case MPI_ERR_BAD_FILE:
+      return ENOENT;
+    default:
+      return EIO;
   }
 }
 

@@ -253,7 +253,7 @@ class SmallRanks : public Ranks {
 
   /// Rows of all ranks, by rank. Collective.
   std::vector<std::vector<char>> all(const std::string& what, const void* bytes, std::size_t n) const;
-  mutable int collectives = 0;       ///< so many so far
+  mutable int collectives = 0;        ///< so many so far
   mutable std::size_t delivered = 0;  ///< bytes of rows that others have sent to this rank
 
  protected:

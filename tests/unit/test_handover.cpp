@@ -369,7 +369,8 @@ struct Slab {
     std::vector<std::int64_t> tags, stored;
     for (int n = 0; n < 792; ++n) {
       const int tag = 1 + 5 * n % 792;  // no order in space
-      w.add(tag, Vec3(-0.11, -0.03, -0.03) + apart * Vec3(n % 22, n / 22 % 6, n / 132), r, Vec3(0.01, 0, 1e-4 * (n % 22)), Vec3(0, 0, 1e-2));
+      w.add(tag, Vec3(-0.11, -0.03, -0.03) + apart * Vec3(n % 22, n / 22 % 6, n / 132), r, Vec3(0.01, 0, 1e-4 * (n % 22)),
+            Vec3(0, 0, 1e-2));
       tags.push_back(tag);
       if (tag % 5 != 0) stored.push_back(tag);
     }
@@ -517,7 +518,8 @@ TEST(Ranks, whoever_knows_a_tag_finds_the_rank_that_has_it) {
     for (int tag = 1; tag < 30; ++tag)
       if (tag / 10 == w.ranks.me) mine.push_back(tag);
     const TagOwners owners(w.ranks, mine);
-    const std::vector<int> found = owners.of(w.ranks.me == 1 ? std::vector<std::int64_t>{} : std::vector<std::int64_t>{29, 3, 30, 12, 3});
+    const std::vector<int> found =
+        owners.of(w.ranks.me == 1 ? std::vector<std::int64_t>{} : std::vector<std::int64_t>{29, 3, 30, 12, 3});
     if (w.ranks.me == 1)
       EXPECT_TRUE(found.empty());
     else
