@@ -5,7 +5,7 @@ from pathlib import Path
 
 from .engine import run_liggghts
 
-ENDS, END_WORDS = b"SDCULLE1", 8  # the end of a section of culled granules, see culling/store_section.h
+ENDS, END_WORDS = b"SDCULLE1", 9  # the end of a section of culled granules, see culling/store_section.h
 
 
 def made(file, recipe, make, say=lambda line: print(line, flush=True)):

@@ -181,7 +181,7 @@ class Restart(Case):
 
     def section(self, data):
         """Where what is culled begins in a restart file: its length stands in its end."""
-        end, length = data[-64:], int.from_bytes(data[-48:-40], "little")
+        end, length = data[-72:], int.from_bytes(data[-56:-48], "little")
         self.assertEqual((end[:8], data[-length:][:8]), (b"SDCULLE1", b"SDCULLB1"))
         return len(data) - length
 
@@ -190,6 +190,7 @@ class Restart(Case):
         self.refused_by_fix(resumed(file, f"{CULL_BLOCK}\nrun 10\n"), line.format(file=file), ranks=ranks)
 
     DAMAGED = "the restart file {file} is damaged among the granules of this fix: use another one"
+    DAMAGED_END = "the restart file {file} is damaged at its end: use another one"
     CUT = "the restart file {file} ends before the granules of this fix do: it was cut when it was written or copied; use a whole one"
 
     def test_damaged_files(self):
@@ -203,11 +204,23 @@ class Restart(Case):
                                   "the restart file is damaged where it holds this fix's granules: use another one")
         section = self.section(whole)
         length = len(whole) - section
-        for place, ranks in ((20, 1), (length // 3, 2), (length // 2, 1), (length - 80, 3)):
+        lists, table = length - 72 - 32 - 16, length - 72 - 16  # one rank wrote
+        for place, line, ranks in ((20, self.DAMAGED, 1), (length // 3, self.DAMAGED, 2), (length // 2, self.DAMAGED, 1),
+                                   (lists, self.DAMAGED, 3), (table, self.DAMAGED_END, 2), (length - 20, self.DAMAGED_END, 3)):
             with self.subTest(section=place, ranks=ranks):
                 broken = bytearray(whole)
                 broken[section + place] ^= 0x55
-                self.refused_file("broken.restart", broken, self.DAMAGED, ranks)
+                self.refused_file("broken.restart", broken, line, ranks)
+
+    def test_damage_that_one_rank_of_many_finds(self):
+        for written, read in ((4, 4), (4, 3), (2, 4)):
+            whole = self.file(written).read_bytes()
+            section = self.section(whole)
+            for part in (0.2, 0.5, 0.8):
+                with self.subTest(written_on=written, read_on=read, damaged_at=part):
+                    broken = bytearray(whole)
+                    broken[section + int(part * (len(whole) - section))] ^= 0x55
+                    self.refused_file("broken.restart", broken, self.DAMAGED, read)
 
     def test_files_that_were_cut(self):
         whole = self.file(1).read_bytes()

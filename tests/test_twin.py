@@ -210,7 +210,7 @@ class Decks(Folder):
             at = made.index("label go")
             self.assertEqual(made[at - len(taken_up):at], taken_up)
             self.assertIn("fix cull all solid/cull", made)
-        self.assertTrue(beds.holds_culled(self.write_bytes("a.restart", b"engine" + b"SDCULLE1" + bytes(56))))
+        self.assertTrue(beds.holds_culled(self.write_bytes("a.restart", b"engine" + b"SDCULLE1" + bytes(64))))
         self.assertFalse(beds.holds_culled(self.write_bytes("b.restart", b"engine" * 20)))
         self.assertFalse(beds.holds_culled(self.folder / "none.restart"))
 

@@ -27,15 +27,14 @@ struct RankGrid {
   Vec3 lo(const Cell& c) const { return {cuts[0][at(c, 0)], cuts[1][at(c, 1)], cuts[2][at(c, 2)]}; }
   Vec3 hi(const Cell& c) const { return {cuts[0][at(c, 0) + 1], cuts[1][at(c, 1) + 1], cuts[2][at(c, 2) + 1]}; }
 
-  /// Who owns the place; outside of the outer cuts, the cell at them.
+  /// That of a place within the box, or beyond a side that is not periodic.
   Cell cell_of(const Vec3& place) const {
-    Cell cell;
+    Cell c{};
     for (int d = 0; d < 3; ++d) {
-      const std::vector<double>& c = cuts[static_cast<std::size_t>(d)];
-      const auto above = std::upper_bound(c.begin() + 1, c.end() - 1, place[d]);
-      cell[static_cast<std::size_t>(d)] = static_cast<int>(above - (c.begin() + 1));
+      const auto inner = cuts[d].begin() + 1, last = cuts[d].end() - 1;
+      c[static_cast<std::size_t>(d)] = static_cast<int>(std::upper_bound(inner, last, place[d]) - inner);
     }
-    return cell;
+    return c;
   }
 
   /// The cells within `width` of cell `own`, or of one of its nearest periodic images; itself by its images alone. Shifts are in

@@ -87,8 +87,10 @@ void Handover::send_home() {
     came.emplace_back(bytes.size() / sizeof(double));
     if (bytes.empty()) continue;
     std::memcpy(came.back().data(), bytes.data(), bytes.size());
-    for (Parcel& p : parcels_.unpack(came.back().data(), came.back().size(), bed_.solid.contacts().width()))
+    for (Parcel& p : parcels_.unpack(came.back().data(), came.back().size(), bed_.solid.contacts().width())) {
+      p.for_this_rank = true;  // the other rank has seen to that, by places that are rounded here
       parcels.push_back(std::move(p));
+    }
   }
   parcels_.take_up(parcels);
 }

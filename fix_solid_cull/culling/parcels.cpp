@@ -320,7 +320,8 @@ void Parcels::take(const Parcel* parcels, std::size_t n) {
       if (g.record) bed_.solid.know_radius(g.type, g.radius);
       const int* i = bed_.index.find(g.tag);
       const bool here = i && bed_.shell[*i].locked && bed_.shell[*i].body == 0;  // an interface granule of a restart file
-      if (!bed_.solid.bodies().body_of(g.tag) && (here || bed_.ranks.owns(p.sender->bodies.at(g.body).pose.to_world(g.position))))
+      if (!bed_.solid.bodies().body_of(g.tag) &&
+          (here || p.for_this_rank || bed_.ranks.owns(p.sender->bodies.at(g.body).pose.to_world(g.position))))
         taken.emplace(g.tag, Taken{&p, &g});
     }
   }
@@ -329,6 +330,16 @@ void Parcels::take(const Parcel* parcels, std::size_t n) {
     take_granule(tag, t);
     if (t.granule->record) taken_in_.push_back(tag);
   }
+}
+
+void Parcels::take_contact(std::int64_t low, std::int64_t high, const double* history) {
+  if (bed_.solid.contacts().contains(low, high)) return;
+  if (history)
+    bed_.solid.freeze(low, high, history);
+  else
+    bed_.solid.freeze_in_frame(low, high, nullptr);
+  const SolidBodies& bodies = bed_.solid.bodies();
+  if (bodies.body_of(low) && bodies.body_of(high)) bed_.solid.tie(low, high, bed_.masses.by_tag());
 }
 
 void Parcels::end_taking() {

@@ -36,6 +36,7 @@ struct Parcel {
   std::shared_ptr<const Sender> sender;
   std::vector<Granule> granules;
   std::vector<Edge> edges;
+  bool for_this_rank = false;  ///< all of them, wherever their places are
 };
 
 /// The only way in which granules come to a rank that did not lock them.
@@ -54,9 +55,11 @@ class Parcels {
     take(parcels.data(), parcels.size());
     end_taking();
   }
-  /// The same in many pieces; a contact comes with the later one of its granules, or before. Local, but for the end.
+  /// The same in many pieces; a contact comes with the later one of its granules, or before, or alone: with the history in the
+  /// world, as `low` sees it, or none. Local, but for the end.
   void begin_taking() { bed_.solid.stands_otherwise(); }
   void take(const Parcel* parcels, std::size_t n);
+  void take_contact(std::int64_t low, std::int64_t high, const double* history);
   void end_taking();
 
   /// Everything as it was on the rank that wrote it: first its bodies, then its parcels, in the order in which

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <memory>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -225,6 +227,16 @@ class Insertions {
   virtual std::vector<Box> counting(double margin) const = 0;
 };
 
+/// A file that all ranks write to, each at places of its own. What goes wrong is told at the end.
+class SharedFile {
+ public:
+  virtual ~SharedFile() = default;
+  virtual std::uint64_t size() const = 0;                                       ///< as it was found, alike on all ranks
+  virtual void write(std::uint64_t at, const void* from, std::size_t n) = 0;    ///< Local
+  /// What was written is on the disk: 0, or the errno of what went wrong on this rank. Collective.
+  virtual int close() = 0;
+};
+
 /// Ranks, and periodic images, which are neighbours too. Rows are plain structs; the same type is named by all ranks.
 class Ranks {
  public:
@@ -246,6 +258,8 @@ class Ranks {
   /// Between two ranks that both know of it: messages come in the order in which they were sent. The sender does not wait.
   virtual void send(int rank, const void* bytes, std::size_t n) const = 0;
   virtual std::vector<char> receive(int rank) const = 0;
+  /// The sum over the ranks before this one. Collective.
+  virtual std::int64_t sum_before(std::int64_t number) const = 0;
 
   /// False where one rank owns a box without periodic sides: exchange() gives nothing then.
   virtual bool has_neighbours() const = 0;
@@ -300,12 +314,37 @@ class Ranks {
   std::vector<Row> gather_on_root(const std::vector<Row>& rows) const {
     return gathered(rows, false);
   }
+  /// Rows for some ranks, by rank; returns what came, by the rank that sent it. No rank learns more. Collective.
+  template <class Row>
+  std::map<int, std::vector<Row>> deliver(const std::map<int, std::vector<Row>>& to) const {
+    static_assert(std::is_trivially_copyable<Row>::value, "a row is plain data");
+    std::vector<Letter> letters;
+    for (const auto& [rank, rows] : to)
+      if (!rows.empty()) letters.push_back({rank, rows.data(), rows.size()});
+    std::map<int, std::vector<Row>> came;
+    deliver_bytes(letters, sizeof(Row), [&](int from, std::size_t n) {
+      std::vector<Row>& rows = came[from];
+      rows.resize(n);
+      return static_cast<void*>(rows.data());
+    });
+    return came;
+  }
+
+  /// A file that is there. Collective.
+  virtual std::unique_ptr<SharedFile> open_to_write(const std::string& file) const = 0;
 
  protected:
   /// Makes room for n rows and says where they go.
   using Room = std::function<void*(std::size_t n)>;
   virtual void exchange_bytes(const void* rows, std::size_t n, std::size_t bytes, double width, const Room& room) const = 0;
   virtual void gather_bytes(const void* rows, std::size_t n, std::size_t bytes, bool everywhere, const Room& room) const = 0;
+  struct Letter {
+    int to;
+    const void* rows;
+    std::size_t n;
+  };
+  using RoomFrom = std::function<void*(int from, std::size_t n)>;
+  virtual void deliver_bytes(const std::vector<Letter>& letters, std::size_t bytes, const RoomFrom& room) const = 0;
 
  private:
   template <class Row>
@@ -329,7 +368,7 @@ class Run {
   std::int64_t reset_by = 0;  ///< the deck's number of this step, less `step`
   double dt = 0;              ///< s
   double skin = 0;            ///< Verlet skin (m)
-  Box box, own;               ///< the whole box, this rank's subdomain
+  Box box;                    ///< the whole of it
   Box kept;                   ///< what passes its sides is lost; infinite where the box is periodic or follows the granules
   std::array<bool, 3> periodic{};
   std::string name;  ///< the fix's ID

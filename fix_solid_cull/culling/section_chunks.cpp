@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <string>
 
 #include "bits.h"
@@ -14,9 +15,10 @@ constexpr int granules_per_chunk = 4096;
 std::uint64_t whole(std::int64_t x) { return static_cast<std::uint64_t>(x); }
 
 // columns of the tables
-enum PartColumn { own_lo = 0, own_hi = 3, observer = 6, observed_then = 13, part_columns = 20 };
+enum PartColumn { own_lo = 0, own_hi = 3, observer = 6, observed_then = 13, places_lo = 20, places_hi = 23, part_columns = 26 };
 enum ContactColumn { c_low, c_high, c_body, c_known, c_history };
 enum GranuleColumn { g_tag, g_body, g_numbers };
+static_assert(int{g_numbers} == chunk_columns::granule_place && int{c_history} == chunk_columns::history, "the same columns");
 
 std::uint64_t word(double x) { return bits_of(x); }
 template <class Whole>
@@ -73,11 +75,60 @@ std::size_t index_below(std::uint64_t x, std::size_t n) {
 
 }  // namespace
 
+// ------------------------------------------------------------------------------------------------------------ tables
+
+void PartTables::read(const SectionChunk& chunk) {
+  const char *at = chunk.bytes.data(), *const end = at + chunk.bytes.size();
+  if (chunk.kind == SectionChunk::part) {
+    at = unpack_columns(at, end, head);
+    at = unpack_columns(at, end, layouts);
+    if (head.rows != 1 || head.columns != part_columns) throw InternalError("a part of a restart file has no head");
+  }
+  unpack_columns(at, end, bodies);
+}
+
+void PartTables::append_to(SectionChunk& chunk) const {
+  if (chunk.kind == SectionChunk::part) {
+    chunk.append(head);
+    chunk.append(layouts);
+  }
+  chunk.append(bodies);
+}
+
+void ChunkTables::read(const SectionChunk& chunk) {
+  const char *at = chunk.bytes.data(), *const end = at + chunk.bytes.size();
+  at = unpack_columns(at, end, interface_granules);
+  at = unpack_columns(at, end, contacts);
+  std::uint64_t more = 0;
+  if (chunk.kind == SectionChunk::interior_granules) {
+    if (static_cast<std::size_t>(end - at) < sizeof more) throw InternalError("a chunk of a restart file ends too early");
+    std::memcpy(&more, at, sizeof more);
+    at += sizeof more;
+  }
+  interior.resize(index_below(more, chunk.bytes.size()));
+  for (WordTable& table : interior) at = unpack_columns(at, end, table);
+  if (granules() != chunk.granules) throw InternalError("a chunk of a restart file misses granules");
+}
+
+void ChunkTables::append_to(SectionChunk& chunk) const {
+  chunk.append(interface_granules);
+  chunk.append(contacts);
+  if (chunk.kind != SectionChunk::interior_granules) return;
+  chunk.append(interior.size());
+  for (const WordTable& table : interior) chunk.append(table);
+}
+
+std::size_t ChunkTables::granules() const {
+  std::size_t n = interface_granules.rows;
+  for (const WordTable& table : interior) n += table.rows;
+  return n;
+}
+
 // ------------------------------------------------------------------------------------------------------------ out
 
 ChunkSource::ChunkSource(const Bed& bed, const Cover& cover) : bed_(bed), cover_(cover), history_(bed.solid.contacts().width()) {
   for (const auto& body : bed_.solid.bodies().bodies()) bodies_.push_back(body.first);
-  contacts_.clear(0);
+  tables_.contacts.clear(0);
 }
 
 std::uint64_t ChunkSource::identity(const Bed& bed) {
@@ -108,34 +159,42 @@ bool ChunkSource::next(SectionChunk& chunk) {
 }
 
 void ChunkSource::part(SectionChunk& chunk) {
-  WordTable table;
-  table.clear(part_columns);
-  std::uint64_t* const row = table.add_row();
-  put(row + own_lo, bed_.run.own.lo);
-  put(row + own_hi, bed_.run.own.hi);
+  PartTables part;
+  part.head.clear(part_columns);
+  std::uint64_t* const row = part.head.add_row();
+  put(row + own_lo, bed_.ranks.own().lo);
+  put(row + own_hi, bed_.ranks.own().hi);
   put(row + observer, cover_.observer());
   put(row + observed_then, cover_.observed_then());
-  chunk.append(table);
-  table.clear(1);
+  constexpr double nowhere = std::numeric_limits<double>::infinity();
+  Box places{Vec3::Constant(nowhere), Vec3::Constant(-nowhere)};
+  bed_.solid.store().for_each([&](const Resident& g) {
+    const Vec3 x = bed_.solid.in_world(g);
+    places.lo = places.lo.cwiseMin(x);
+    places.hi = places.hi.cwiseMax(x);
+  });
+  put(row + places_lo, places.lo);
+  put(row + places_hi, places.hi);
+  part.layouts.clear(1);
   for (int l = 0; l < bed_.atoms.layouts(); ++l)
-    for (const char c : bed_.atoms.layout_text(l) + "\n") *table.add_row() = static_cast<unsigned char>(c);
-  chunk.append(table);
+    for (const char c : bed_.atoms.layout_text(l) + "\n") *part.layouts.add_row() = static_cast<unsigned char>(c);
   std::vector<double> numbers;
-  table.clear(0);
+  part.bodies.clear(0);
   for (const auto& body : bed_.solid.bodies().bodies()) {
     SolidBody b = body.second;
     numbers.clear();
     b.each_number([&](auto& x) { numbers.push_back(static_cast<double>(x)); });
-    if (table.rows == 0) table.clear(numbers.size());
-    std::transform(numbers.begin(), numbers.end(), table.add_row(), bits_of);
+    if (part.bodies.rows == 0) part.bodies.clear(numbers.size());
+    std::transform(numbers.begin(), numbers.end(), part.bodies.add_row(), bits_of);
   }
-  chunk.append(table);
+  part.append_to(chunk);
 }
 
 void ChunkSource::begin_block() {
-  contacts_before_ += contacts_.rows;
-  contacts_.clear(c_history + bed_.solid.contacts().width());
-  granules_.clear(granule_columns());
+  contacts_before_ += tables_.contacts.rows;
+  tables_.contacts.clear(c_history + bed_.solid.contacts().width());
+  tables_.interface_granules.clear(granule_columns());
+  tables_.interior.clear();
   by_length_.clear();
 }
 
@@ -146,7 +205,7 @@ void ChunkSource::contact(std::int64_t low, std::int64_t high, const double* his
   if (!body || at == bodies_.end() || *at != body)
     throw InternalError("a frozen contact of granules " + std::to_string(low) + " and " + std::to_string(high) +
                         " is of no body of this rank");
-  std::uint64_t* const row = contacts_.add_row();
+  std::uint64_t* const row = tables_.contacts.add_row();
   row[c_low] = whole(low);
   row[c_high] = whole(high);
   row[c_body] = static_cast<std::uint64_t>(at - bodies_.begin());
@@ -192,55 +251,59 @@ std::uint64_t* ChunkSource::granule(WordTable& table, StoredGranule g) const {
 void ChunkSource::interface_block(SectionChunk& chunk) {
   begin_block();
   const Atoms& atoms = bed_.atoms;
-  for (; atom_ < atoms.owned && granules_.rows < granules_per_chunk; ++atom_) {
+  for (; atom_ < atoms.owned && tables_.interface_granules.rows < granules_per_chunk; ++atom_) {
     if (!bed_.shell[atom_].locked) continue;
-    granule(granules_, bed_.interface_granule(atom_));
+    granule(tables_.interface_granules, bed_.interface_granule(atom_));
     contacts_of(atoms.tag[atom_]);
   }
-  if (granules_.rows == 0) return;
-  chunk.begin(SectionChunk::interface_granules, chunk.rank, granules_.rows);
-  interface_ += granules_.rows;
-  chunk.append(granules_);
-  chunk.append(contacts_);
+  give(SectionChunk::interface_granules, chunk);
 }
 
 void ChunkSource::interior_block(SectionChunk& chunk) {
   begin_block();
-  std::uint64_t granules = 0;
   const auto add = [&](const StoredGranule& g, const std::uint64_t* record, int length) {
-    WordTable& table = by_length_[length];
-    if (table.rows == 0) table.clear(granule_columns() + static_cast<std::size_t>(length));
-    std::copy(record, record + length, granule(table, g));
+    const auto known = by_length_.emplace(length, tables_.interior.size());
+    if (known.second) {
+      tables_.interior.emplace_back();
+      tables_.interior.back().clear(granule_columns() + static_cast<std::size_t>(length));
+    }
+    std::copy(record, record + length, granule(tables_.interior[known.first->second], g));
     contacts_of(g.tag);
-    ++granules;
   };
   slot_ = bed_.solid.store().visit_some(slot_, granules_per_chunk, add);
-  if (granules == 0) return;
-  chunk.begin(SectionChunk::interior_granules, chunk.rank, granules);
-  interior_ += granules;
-  chunk.append(granules_);
-  chunk.append(contacts_);
-  chunk.append(by_length_.size());
-  for (const auto& table : by_length_) chunk.append(table.second);
+  std::sort(tables_.interior.begin(), tables_.interior.end(),
+            [](const WordTable& a, const WordTable& b) { return a.columns < b.columns; });
+  give(SectionChunk::interior_granules, chunk);
+}
+
+/// Nothing, where there are no granules.
+void ChunkSource::give(std::uint64_t kind, SectionChunk& chunk) {
+  if (tables_.granules() == 0) return;
+  chunk.begin(kind, chunk.rank, tables_.granules());
+  counts_.add(kind, chunk.granules);
+  tables_.append_to(chunk);
 }
 
 // ------------------------------------------------------------------------------------------------------------ in
 
 auto ChunkReader::part(const SectionChunk& chunk) -> const Head& {
-  const char *at = chunk.bytes.data(), *const end = at + chunk.bytes.size();
-  auto sender = std::make_shared<Sender>();
-  WordTable table;
-  at = unpack_columns(at, end, table);
-  if (table.rows != 1 || table.columns != part_columns) throw InternalError("a part of a restart file has no head");
-  head_.own = {vector_of(table.row(0) + own_lo), vector_of(table.row(0) + own_hi)};
-  sender->rank = static_cast<int>(chunk.rank);
-  sender->observer = pose_of(table.row(0) + observer);
-  sender->observed_then = pose_of(table.row(0) + observed_then);
-  at = unpack_columns(at, end, table);
+  PartTables tables;
+  tables.read(chunk);
+  return part(tables, chunk.rank);
+}
+
+auto ChunkReader::part(const PartTables& tables, std::uint64_t rank) -> const Head& {
+  const std::uint64_t* const row = tables.head.row(0);
+  head_.own = {vector_of(row + own_lo), vector_of(row + own_hi)};
+  head_.places = {vector_of(row + places_lo), vector_of(row + places_hi)};
+  sender_ = std::make_shared<Sender>();
+  sender_->rank = static_cast<int>(rank);
+  sender_->observer = pose_of(row + observer);
+  sender_->observed_then = pose_of(row + observed_then);
   layout_.clear();
   std::string text;
-  for (std::size_t r = 0; r < table.rows; ++r) {
-    const char c = static_cast<char>(*table.row(r));
+  for (std::size_t r = 0; r < tables.layouts.rows; ++r) {
+    const char c = static_cast<char>(*tables.layouts.row(r));
     if (c != '\n') {
       text += c;
       continue;
@@ -248,42 +311,40 @@ auto ChunkReader::part(const SectionChunk& chunk) -> const Head& {
     layout_.push_back(bed_.atoms.layout_from_text(text));
     text.clear();
   }
-  unpack_columns(at, end, table);
-  sender->bodies.resize(table.rows);
+  head_.sender = sender_;
+  more_bodies(tables.bodies);
+  return head_;
+}
+
+void ChunkReader::more_bodies(const WordTable& table) {
+  if (!sender_) throw InternalError("bodies of a restart file come before their part");
   for (std::size_t r = 0; r < table.rows; ++r) {
     std::size_t c = 0;
-    sender->bodies[r].each_number([&](auto& x) {
+    sender_->bodies.emplace_back();
+    sender_->bodies.back().each_number([&](auto& x) {
       x = static_cast<std::decay_t<decltype(x)>>(number_of(table.row(r)[index_below(c, table.columns)]));
       ++c;
     });
   }
-  head_.sender = sender;
-  return head_;
 }
 
 const Parcel& ChunkReader::parcel(const SectionChunk& chunk) {
-  if (!head_.sender || static_cast<std::uint64_t>(head_.sender->rank) != chunk.rank)
+  if (!sender_ || static_cast<std::uint64_t>(sender_->rank) != chunk.rank)
     throw InternalError("a chunk of a restart file stands before its part");
-  const char *at = chunk.bytes.data(), *const end = at + chunk.bytes.size();
-  parcel_.sender = head_.sender;
+  tables_.read(chunk);
+  return parcel(tables_);
+}
+
+const Parcel& ChunkReader::parcel(const ChunkTables& tables) {
+  parcel_.sender = sender_;
   parcel_.granules.clear();
-  at = unpack_columns(at, end, interface_);
-  read_granules(interface_, nullptr);
-  at = unpack_columns(at, end, contacts_);
-  read_contacts(contacts_);
-  if (chunk.kind == SectionChunk::interior_granules) {
-    std::uint64_t tables = 0;
-    if (static_cast<std::size_t>(end - at) < sizeof tables) throw InternalError("a chunk of a restart file ends too early");
-    std::memcpy(&tables, at, sizeof tables);
-    at += sizeof tables;
-    records_.resize(index_below(tables, chunk.bytes.size()));
-    for (std::vector<double>& numbers : records_) {
-      at = unpack_columns(at, end, interior_);
-      numbers_of(interior_, numbers);
-      read_granules(interior_, numbers.data());
-    }
+  read_granules(tables.interface_granules, nullptr);
+  read_contacts(tables.contacts);
+  records_.resize(tables.interior.size());
+  for (std::size_t t = 0; t < tables.interior.size(); ++t) {
+    numbers_of(tables.interior[t], records_[t]);
+    read_granules(tables.interior[t], records_[t].data());
   }
-  if (parcel_.granules.size() != chunk.granules) throw InternalError("a chunk of a restart file misses granules");
   return parcel_;
 }
 
@@ -296,7 +357,7 @@ void ChunkReader::read_contacts(const WordTable& table) {
   for (std::size_t r = 0; r < table.rows; ++r) {
     const std::uint64_t* const row = table.row(r);
     parcel_.edges.push_back({static_cast<std::int64_t>(row[c_low]), static_cast<std::int64_t>(row[c_high]),
-                             static_cast<int>(index_below(row[c_body], head_.sender->bodies.size())),
+                             static_cast<int>(index_below(row[c_body], sender_->bodies.size())),
                              row[c_known] ? histories_.data() + r * table.columns + c_history : nullptr});
   }
 }
@@ -309,7 +370,7 @@ void ChunkReader::read_granules(const WordTable& table, const double* numbers) {
     const std::uint64_t* const row = table.row(r);
     Parcel::Granule g;
     g.tag = static_cast<std::int64_t>(row[g_tag]);
-    g.body = static_cast<int>(index_below(row[g_body], head_.sender->bodies.size()));
+    g.body = static_cast<int>(index_below(row[g_body], sender_->bodies.size()));
     const std::uint64_t* at = row + g_numbers;
     g.each_number([&](auto& x) { read(x, *at++); });
     if (numbers) {

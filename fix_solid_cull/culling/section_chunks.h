@@ -13,15 +13,40 @@
 
 namespace solidcull {
 
+/// The tables of a chunk of kind `part`, and of `more_bodies` (see ChunkShares), which has the bodies alone.
+struct PartTables {
+  WordTable head, layouts, bodies;
+  void read(const SectionChunk& chunk);
+  void append_to(SectionChunk& chunk) const;
+};
+
+/// The tables of a chunk of granules.
+struct ChunkTables {
+  WordTable interface_granules, contacts;
+  std::vector<WordTable> interior;
+  void read(const SectionChunk& chunk);
+  void append_to(SectionChunk& chunk) const;
+  std::size_t granules() const;
+};
+
+/// What others must know of the columns of these tables.
+namespace chunk_columns {
+constexpr std::size_t granule_tag = 0, granule_body = 1, granule_place = 2;  // three words, frame of the body
+constexpr std::size_t low = 0, high = 1, contact_body = 2, known = 3, history = 4;
+}  // namespace chunk_columns
+
 /// Gives the chunks of this rank one by one. Nothing may change meanwhile. Local.
 class ChunkSource {
  public:
   ChunkSource(const Bed& bed, const Cover& cover);
   /// False after the last one.
   bool next(SectionChunk& chunk);
-  std::uint64_t interior() const { return interior_; }  ///< granules and contacts so far
-  std::uint64_t interface_granules() const { return interface_; }
-  std::uint64_t contacts() const { return contacts_.rows + contacts_before_; }
+  /// Granules and contacts so far.
+  SectionCounts counts() const {
+    SectionCounts so_far = counts_;
+    so_far.contacts = tables_.contacts.rows + contacts_before_;
+    return so_far;
+  }
   /// A number that names what the chunks of this rank hold; costs a walk through all granules.
   static std::uint64_t identity(const Bed& bed);
 
@@ -29,6 +54,7 @@ class ChunkSource {
   void part(SectionChunk& chunk);
   void interface_block(SectionChunk& chunk);
   void interior_block(SectionChunk& chunk);
+  void give(std::uint64_t kind, SectionChunk& chunk);
   std::uint64_t* granule(WordTable& table, StoredGranule g) const;
   void begin_block();
   void contacts_of(std::int64_t tag);
@@ -39,25 +65,31 @@ class ChunkSource {
   bool part_given_ = false;
   int atom_ = 0, slot_ = 0;
   std::vector<int> bodies_;  // their numbers, ascending
-  WordTable granules_, contacts_;
-  std::map<int, WordTable> by_length_;  // of the record
+  ChunkTables tables_;
+  std::map<int, std::size_t> by_length_;  // of the record: which table
   std::vector<double> history_;
-  std::uint64_t interior_ = 0, interface_ = 0, contacts_before_ = 0, graph_contacts_ = 0;
+  SectionCounts counts_;
+  std::uint64_t contacts_before_ = 0, graph_contacts_ = 0;
 };
 
-/// Reads chunks in the order of the file. Local.
+/// Reads the chunks of one part. Local.
 class ChunkReader {
  public:
   explicit ChunkReader(const Bed& bed) : bed_(bed) {}
 
   struct Head {
-    Box own;  ///< the subdomain of the rank that wrote
+    Box own;     ///< the subdomain of the rank that wrote
+    Box places;  ///< holds its interior granules
     std::shared_ptr<const Sender> sender;
   };
-  /// Of a chunk of kind `part`; those that follow are of this part.
   const Head& part(const SectionChunk& chunk);
-  /// Of the other kinds; valid until the next chunk is read.
+  const Head& part(const PartTables& tables, std::uint64_t rank);
+  /// Behind those that are known.
+  void more_bodies(const WordTable& bodies);
+  /// Valid until the next chunk is read.
   const Parcel& parcel(const SectionChunk& chunk);
+  const Parcel& parcel(const ChunkTables& tables);
+  const Sender& sender() const { return *sender_; }
 
  private:
   void read_contacts(const WordTable& table);
@@ -65,9 +97,10 @@ class ChunkReader {
 
   const Bed& bed_;
   Head head_;
+  std::shared_ptr<Sender> sender_;
   std::vector<int> layout_;
   Parcel parcel_;
-  WordTable interface_, contacts_, interior_;
+  ChunkTables tables_;
   std::vector<double> histories_;
   std::vector<std::vector<double>> records_;  // of the tables of interior granules
 };

@@ -7,12 +7,13 @@
 #include <string>
 
 #include "input_error.h"
+#include "section_delivery.h"
 #include "word_sum.h"
 
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261129;  // the format's version
+constexpr double file_mark = 20261202;  // the format's version
 /// The numbers in the file's head. The largest stored radius of each type and a check sum follow them.
 enum Header {
   mark,
@@ -96,22 +97,10 @@ std::vector<double> Snapshot::write(bool run_begins) {
 void Snapshot::append_to(const std::string& file) {
   if (!bed_.solid.has_store()) return;
   SectionWriter out(bed_.ranks, file, identity_);
-  std::int64_t counts[3] = {0, 0, 0};
-  for (int rank = 0; rank < bed_.ranks.count; ++rank) {
-    const bool mine = rank == bed_.ranks.me;
-    ChunkSource source(bed_, cover_);
-    for (SectionChunk chunk; bed_.ranks.any(mine && source.next(chunk)); chunk.bytes.clear()) out.put(chunk);
-    if (!mine) continue;
-    counts[0] = static_cast<std::int64_t>(source.interior());
-    counts[1] = static_cast<std::int64_t>(source.interface_granules());
-    counts[2] = static_cast<std::int64_t>(source.contacts());
+  ChunkSource source(bed_, cover_);
+  for (SectionChunk chunk; out.put(source.next(chunk) ? chunk : SectionChunk());) {
   }
-  bed_.ranks.sum(counts, 3);
-  SectionCounts whole;
-  whole.interior = static_cast<std::uint64_t>(counts[0]);
-  whole.interface_granules = static_cast<std::uint64_t>(counts[1]);
-  whole.contacts = static_cast<std::uint64_t>(counts[2]);
-  out.close(whole);
+  out.close(source.counts());
 }
 
 // ------------------------------------------------------------------------------------------------------------ in
@@ -173,7 +162,25 @@ void Snapshot::take_up() {
   if (h[has_section] == 0) return;
   const std::uint64_t identity = joined(h + identity_high);
   bed_.index.index(bed_.atoms);
-  take(identity, static_cast<int>(h[ranks]) == bed_.ranks.count && stands_as_it_was(identity));
+  if (bed_.ranks.any(bed_.ranks.subdomain_changed())) bed_.ranks.update();
+  SectionReader section(bed_.ranks, file_, identity);
+  const bool as_it_was = static_cast<int>(h[ranks]) == bed_.ranks.count &&
+                         section.parts().size() == static_cast<std::size_t>(bed_.ranks.count) && stands_as_it_was(section);
+  const SectionCounts taken = as_it_was ? take_as_it_was(section) : SectionDelivery(bed_, parcels_, section).take_all();
+  check_counts(section.counts(), taken);
+}
+
+/// Every chunk was read once, and every granule is there.
+void Snapshot::check_counts(const SectionCounts& due, const SectionCounts& taken) const {
+  std::int64_t all[] = {static_cast<std::int64_t>(taken.chunks), static_cast<std::int64_t>(taken.interior),
+                        static_cast<std::int64_t>(taken.interface_granules),
+                        static_cast<std::int64_t>(bed_.solid.store().size())};
+  bed_.ranks.sum(all, 4);
+  const auto is = [](std::int64_t n, std::uint64_t other) { return static_cast<std::uint64_t>(n) == other; };
+  if (!is(all[0], due.chunks) || !is(all[1], due.interior) || !is(all[2], due.interface_granules)) throw InputError(damaged);
+  if (!is(all[3], due.interior))
+    throw InternalError("of " + std::to_string(due.interior) + " interior granules of the restart file " +
+                        std::to_string(all[3]) + " were taken up");
 }
 
 /// Whether this rank holds what is in the parcel.
@@ -184,66 +191,55 @@ bool Snapshot::holds(const Parcel& p) const {
   });
 }
 
-/// Whether each rank holds all that it wrote, and locked atoms that it wrote only.
-bool Snapshot::stands_as_it_was(std::uint64_t identity) const {
+/// Whether each rank holds all that it wrote, and locked atoms that it wrote only. Keeps the chunks that it has read, all but
+/// those of interior granules, so that they are not read again.
+bool Snapshot::stands_as_it_was(SectionReader& section) const {
   std::int64_t locked = 0;
   for (int i = 0; i < bed_.atoms.owned; ++i) locked += bed_.shell[i].locked;
-  bool same = true, moved = false;  // moved: the borders of the subdomain
-  SectionReader section(bed_.ranks, file_, identity);
+  bool same = true, moved = false, within = false;  // moved: the borders of the subdomain
   ChunkReader reader(bed_);
-  const auto mine = [&](const SectionChunk& c) { return c.rank == static_cast<std::uint64_t>(bed_.ranks.me); };
   SectionChunk chunk;
-  while (section.next(chunk, [](const SectionChunk& c) { return c.kind != SectionChunk::interior_granules; })) {
-    if (!mine(chunk) || chunk.kind == SectionChunk::interior_granules) continue;
-    if (chunk.kind == SectionChunk::part) {
-      const Box& then = reader.part(chunk).own;
-      moved = moved || then.lo != bed_.run.own.lo || then.hi != bed_.run.own.hi;
+  const std::vector<ChunkPlace> chunks = section.list(static_cast<std::size_t>(bed_.ranks.me));
+  for (const ChunkPlace& c : chunks) {
+    if (c.kind == SectionChunk::interior_granules) continue;
+    if (!section.read(c, chunk)) break;
+    if (c.kind == SectionChunk::part) {
+      const ChunkReader::Head& head = reader.part(chunk);
+      const Box own = bed_.ranks.own(), &places = head.places;
+      moved = head.own.lo != own.lo || head.own.hi != own.hi;
+      within = (places.lo.array() >= own.lo.array()).all() && (places.hi.array() < own.hi.array()).all();
     } else {
-      locked -= static_cast<std::int64_t>(chunk.granules);
+      locked -= static_cast<std::int64_t>(c.granules);
       same = same && holds(reader.parcel(chunk));
     }
+    section.keep(c, std::move(chunk));
   }
+  section.agree();
   if (bed_.ranks.any(!same || locked != 0)) return false;
   if (bed_.ranks.count == 1 || !bed_.ranks.any(moved)) return true;
-  SectionReader again(bed_.ranks, file_, identity);
-  while (again.next(chunk)) {
-    if (!mine(chunk)) continue;
-    if (chunk.kind == SectionChunk::part)
-      reader.part(chunk);
-    else
-      same = same && holds(reader.parcel(chunk));
+  for (const ChunkPlace& c : chunks) {
+    if (within || !same) break;
+    if (c.kind == SectionChunk::interior_granules && section.read(c, chunk)) same = holds(reader.parcel(chunk));
   }
+  section.agree();
   return !bed_.ranks.any(!same);
 }
 
-void Snapshot::take(std::uint64_t identity, bool as_it_was) {
-  SectionReader section(bed_.ranks, file_, identity);
+SectionCounts Snapshot::take_as_it_was(SectionReader& section) {
   ChunkReader reader(bed_);
-  SectionCounts read;
-  if (!as_it_was) parcels_.begin_taking();
-  for (SectionChunk chunk; section.next(chunk);) {
-    ++read.chunks;
-    if (chunk.kind == SectionChunk::interior_granules) read.interior += chunk.granules;
-    if (chunk.kind == SectionChunk::interface_granules) read.interface_granules += chunk.granules;
-    if (as_it_was && chunk.rank != static_cast<std::uint64_t>(bed_.ranks.me)) continue;
-    if (chunk.kind == SectionChunk::part) {
-      const ChunkReader::Head& head = reader.part(chunk);
-      if (as_it_was) parcels_.begin_as_it_was(*head.sender);
-    } else if (as_it_was) {
+  SectionCounts taken;
+  SectionChunk chunk;
+  for (const ChunkPlace& c : section.list(static_cast<std::size_t>(bed_.ranks.me))) {
+    if (!section.read(c, chunk)) break;
+    taken.add(c.kind, c.granules);
+    if (c.kind == SectionChunk::part)
+      parcels_.begin_as_it_was(*reader.part(chunk).sender);
+    else
       parcels_.take_as_it_was(reader.parcel(chunk));
-    } else {
-      parcels_.take(&reader.parcel(chunk), 1);
-    }
   }
-  const SectionCounts& due = section.counts();
-  if (read.chunks != due.chunks || read.interior != due.interior || read.interface_granules != due.interface_granules)
-    throw InputError(damaged);
-  as_it_was ? parcels_.end_as_it_was() : parcels_.end_taking();
-  std::int64_t stored = static_cast<std::int64_t>(bed_.solid.store().size());
-  bed_.ranks.sum(&stored, 1);
-  if (stored != static_cast<std::int64_t>(due.interior))
-    throw InternalError("of " + std::to_string(due.interior) + " interior granules of the restart file " +
-                        std::to_string(stored) + " were taken up");
+  section.agree();
+  parcels_.end_as_it_was();
+  return taken;
 }
 
 }  // namespace solidcull

@@ -38,9 +38,10 @@ class Snapshot {
   void take_up();
 
  private:
-  bool stands_as_it_was(std::uint64_t identity) const;
+  bool stands_as_it_was(SectionReader& section) const;
   bool holds(const Parcel& parcel) const;
-  void take(std::uint64_t identity, bool as_it_was);
+  void check_counts(const SectionCounts& due, const SectionCounts& taken) const;
+  SectionCounts take_as_it_was(SectionReader& section);
 
   Bed& bed_;
   Parcels& parcels_;

@@ -11,13 +11,15 @@
 #include "comm.h"
 #include "domain.h"
 #include "invariants.h"
+#include "internal_error.h"
+#include "mpi_file.h"
 #include "neighbor.h"
 
 namespace solidcull {
 namespace {
 
 // LIGGGHTS's own messages have other tags
-constexpr int exchange_tag = 7311, message_tag = 7312;
+constexpr int exchange_tag = 7311, message_tag = 7312, delivery_tag = 7313;  // deliveries take two tags by turns
 
 /// MPI counts rows, so that messages may be larger than 2 GiB.
 class RowType {
@@ -64,6 +66,12 @@ void EngineRanks::largest(double* numbers, int n) const {
 }
 void EngineRanks::largest(std::int64_t* numbers, int n) const {
   if (count > 1) MPI_Allreduce(MPI_IN_PLACE, numbers, n, MPI_INT64_T, MPI_MAX, world);
+}
+
+std::int64_t EngineRanks::sum_before(std::int64_t number) const {
+  std::int64_t before = 0;
+  if (count > 1) MPI_Exscan(&number, &before, 1, MPI_INT64_T, MPI_SUM, world);
+  return me == 0 ? 0 : before;
 }
 
 void EngineRanks::begin_any(unsigned bits) const {
@@ -303,6 +311,47 @@ void EngineRanks::gather_bytes(const void* rows, std::size_t n, std::size_t byte
     MPI_Allgatherv(rows, mine, row, to, counts.data(), at.data(), row, world);
   else
     MPI_Gatherv(rows, mine, row, to, counts.data(), at.data(), row, 0, world);
+}
+
+/// Nobody knows from whom letters come, or how many: who has sent all his, and they were taken, comes to the barrier, and takes
+/// letters until all have come. So nothing is as long as there are ranks. A rank may be one delivery ahead of another: tags go by
+/// turns.
+void EngineRanks::deliver_bytes(const std::vector<Letter>& letters, std::size_t bytes, const RoomFrom& room) const {
+  const int tag = delivery_tag + (deliveries_++ & 1);
+  const RowType row(bytes);
+  std::vector<MPI_Request> sent;
+  for (const Letter& l : letters) {
+    if (l.to == me) {
+      std::memcpy(room(me, l.n), l.rows, l.n * bytes);
+      continue;
+    }
+    if (l.n > static_cast<std::size_t>(std::numeric_limits<int>::max()))
+      throw InternalError("a letter to another rank has " + std::to_string(l.n) + " rows");
+    sent.emplace_back();
+    MPI_Issend(l.rows, static_cast<int>(l.n), row, l.to, tag, world, &sent.back());
+  }
+  if (count == 1) return;
+  MPI_Request all_came = MPI_REQUEST_NULL;
+  for (int done = 0; !done;) {
+    int there = 0;
+    MPI_Status status;
+    MPI_Iprobe(MPI_ANY_SOURCE, tag, world, &there, &status);
+    if (there) {
+      int n = 0;
+      MPI_Get_count(&status, row, &n);
+      MPI_Recv(room(status.MPI_SOURCE, static_cast<std::size_t>(n)), n, row, status.MPI_SOURCE, tag, world, MPI_STATUS_IGNORE);
+    } else if (all_came != MPI_REQUEST_NULL) {
+      MPI_Test(&all_came, &done, MPI_STATUS_IGNORE);
+    } else {
+      int taken = 0;
+      MPI_Testall(static_cast<int>(sent.size()), sent.data(), &taken, MPI_STATUSES_IGNORE);
+      if (taken) MPI_Ibarrier(world, &all_came);
+    }
+  }
+}
+
+std::unique_ptr<SharedFile> EngineRanks::open_to_write(const std::string& file) const {
+  return std::make_unique<MpiFile>(world, file);
 }
 
 }  // namespace solidcull

@@ -6,6 +6,8 @@
 #include <array>
 #include <list>
 #include <map>
+#include <memory>
+#include <string>
 #include <vector>
 
 #include "pointers.h"
@@ -24,6 +26,7 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
   void sum(std::int64_t* numbers, int n) const override;
   void largest(double* numbers, int n) const override;
   void largest(std::int64_t* numbers, int n) const override;
+  std::int64_t sum_before(std::int64_t number) const override;
 
   void begin_any(unsigned bits) const override;
   unsigned end_any() const override;
@@ -45,10 +48,12 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
   void expect_far_out(bool on) override { far_out_ = on; }
   std::vector<int> neighbours() const override;
   const std::vector<Vec3>& image_shifts() const override { return shifts_; }
+  std::unique_ptr<SharedFile> open_to_write(const std::string& file) const override;
 
  protected:
   void exchange_bytes(const void* rows, std::size_t n, std::size_t bytes, double width, const Room& room) const override;
   void gather_bytes(const void* rows, std::size_t n, std::size_t bytes, bool everywhere, const Room& room) const override;
+  void deliver_bytes(const std::vector<Letter>& letters, std::size_t bytes, const RoomFrom& room) const override;
 
  private:
   struct Partner : RankGrid::Partner {
@@ -71,6 +76,7 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
   mutable std::list<Message> sent_;                          // that MPI still needs
   mutable unsigned asked_ = 0, answer_ = 0;
   mutable MPI_Request asking_ = MPI_REQUEST_NULL;
+  mutable int deliveries_ = 0;
 };
 
 }  // namespace solidcull

@@ -19,7 +19,6 @@ void EngineRun::renew() {
   dt = update->dt;
   skin = neighbor->skin;
   box = {vec(domain->boxlo), vec(domain->boxhi)};
-  own = {vec(domain->sublo), vec(domain->subhi)};
   periodic = {domain->xperiodic != 0, domain->yperiodic != 0, domain->zperiodic != 0};
   constexpr int fixed = 1;  // of Domain::boundary
   constexpr double never = std::numeric_limits<double>::infinity();

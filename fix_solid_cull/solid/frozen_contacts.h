@@ -49,6 +49,15 @@ class FrozenContacts {
     unturned_ = std::vector<std::uint32_t>();
   }
 
+  /// Before that, every contact once: visit(low tag, high tag, history in the world as the low tag sees it or nullptr).
+  template <class Visit>
+  void for_each_contact_in_world(Visit visit) const {
+    std::vector<bool> waits(edges_.size());
+    for (const std::uint32_t e : unturned_) waits[e] = true;
+    for (std::uint32_t e = 0; e < edges_.size(); ++e)
+      if (edges_[e].low != edges_[e].high) visit(edges_[e].low, edges_[e].high, waits[e] ? histories_.row(e) : nullptr);
+  }
+
   /// Calls visit(partner, history as `tag` sees it or nullptr) for each contact of `tag`.
   template <class Visit>
   void for_each(std::int64_t tag, Visit visit) const {

@@ -1,6 +1,11 @@
 #include "small_world.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -232,6 +237,16 @@ void SmallRanks::send(int rank, const void* bytes, std::size_t n) const {
 
 std::vector<char> SmallRanks::receive(int rank) const { return meeting_->take(rank, me); }
 
+std::int64_t SmallRanks::sum_before(std::int64_t number) const {
+  std::int64_t before = 0, one = 0;
+  const auto rows = all("sum before", &number, sizeof number);
+  for (int r = 0; r < me; ++r) {
+    std::memcpy(&one, rows[static_cast<std::size_t>(r)].data(), sizeof one);
+    before += one;
+  }
+  return before;
+}
+
 bool SmallRanks::has_neighbours() const { return count > 1 || shifts_.size() > 1; }
 
 void SmallRanks::update() {
@@ -299,6 +314,67 @@ void SmallRanks::exchange_bytes(const void* rows, std::size_t n, std::size_t byt
     }
   void* const to = room(in.size() / bytes);
   if (!in.empty()) std::memcpy(to, in.data(), in.size());
+}
+
+void SmallRanks::deliver_bytes(const std::vector<Letter>& letters, std::size_t bytes, const RoomFrom& room) const {
+  std::vector<char> out;
+  for (const Letter& l : letters) {
+    const std::size_t head[2] = {static_cast<std::size_t>(l.to), l.n};
+    out.insert(out.end(), reinterpret_cast<const char*>(head), reinterpret_cast<const char*>(head + 2));
+    out.insert(out.end(), static_cast<const char*>(l.rows), static_cast<const char*>(l.rows) + l.n * bytes);
+  }
+  const auto of = all("deliver rows of " + std::to_string(bytes), out.data(), out.size());
+  for (int rank = 0; rank < count; ++rank) {
+    const auto& one = of[static_cast<std::size_t>(rank)];
+    for (std::size_t at = 0; at < one.size();) {
+      std::size_t head[2];
+      std::memcpy(head, &one[at], sizeof head);
+      at += sizeof head;
+      if (head[0] == static_cast<std::size_t>(me)) {
+        std::memcpy(room(rank, head[1]), &one[at], head[1] * bytes);
+        if (rank != me) delivered += head[1] * bytes;
+      }
+      at += head[1] * bytes;
+    }
+  }
+}
+
+namespace {
+
+class SmallFile : public SharedFile {
+ public:
+  SmallFile(const SmallRanks& ranks, const std::string& name)
+      : file_(::open(name.c_str(), O_WRONLY | (ranks.me == 0 ? O_CREAT : 0), 0666)) {
+    if (file_ < 0) error_ = errno;
+    struct stat there {};
+    if (ranks.me == 0 && file_ >= 0) ::fstat(file_, &there);
+    std::int64_t size = there.st_size;
+    ranks.sum(&size, 1);
+    size_ = static_cast<std::uint64_t>(size);
+    if (ranks.me != 0 && file_ < 0) {  // made meanwhile
+      file_ = ::open(name.c_str(), O_WRONLY);
+      error_ = file_ < 0 ? errno : 0;
+    }
+  }
+  ~SmallFile() override {
+    if (file_ >= 0) ::close(file_);
+  }
+  SmallFile(const SmallFile&) = delete;
+  std::uint64_t size() const override { return size_; }
+  void write(std::uint64_t at, const void* from, std::size_t n) override {
+    if (error_ == 0 && ::pwrite(file_, from, n, static_cast<off_t>(at)) != static_cast<ssize_t>(n)) error_ = errno ? errno : EIO;
+  }
+  int close() override { return error_; }
+
+ private:
+  int file_, error_ = 0;
+  std::uint64_t size_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<SharedFile> SmallRanks::open_to_write(const std::string& file) const {
+  return std::make_unique<SmallFile>(*this, file);
 }
 
 void SmallRanks::gather_bytes(const void* rows, std::size_t n, std::size_t bytes, bool everywhere, const Room& room) const {
@@ -831,7 +907,6 @@ SmallWorld::SmallWorld(const SmallDeck& its_deck, Meeting* meeting, int rank, in
   run.dt = deck.dt;
   run.skin = deck.skin;
   run.box = deck.box;
-  run.own = ranks.own();
   run.periodic = deck.periodic;
   run.kept = deck.box;
   for (int d = 0; d < 3; ++d)

@@ -8,6 +8,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <set>
 #include <stdexcept>
@@ -249,6 +250,7 @@ class SmallRanks : public Ranks {
   void sum(std::int64_t* numbers, int n) const override;
   void largest(double* numbers, int n) const override;
   void largest(std::int64_t* numbers, int n) const override;
+  std::int64_t sum_before(std::int64_t number) const override;
   void begin_any(unsigned bits) const override { asked_ = bits; }
   unsigned end_any() const override;
   void send(int rank, const void* bytes, std::size_t n) const override;
@@ -267,15 +269,18 @@ class SmallRanks : public Ranks {
   void expect_far_out(bool) override {}
   std::vector<int> neighbours() const override;
   const std::vector<Vec3>& image_shifts() const override { return shifts_; }
+  std::unique_ptr<SharedFile> open_to_write(const std::string& file) const override;
 
   /// Rows of all ranks, by rank. Collective.
   std::vector<std::vector<char>> all(const std::string& what, const void* bytes, std::size_t n) const;
-  mutable int collectives = 0;  ///< so many so far
-  mutable int messages = 0;     ///< so many sent
+  mutable int collectives = 0;        ///< so many so far
+  mutable int messages = 0;           ///< so many sent
+  mutable std::size_t delivered = 0;  ///< bytes of rows that others have sent to this rank
 
  protected:
   void exchange_bytes(const void* rows, std::size_t n, std::size_t bytes, double width, const Room& room) const override;
   void gather_bytes(const void* rows, std::size_t n, std::size_t bytes, bool everywhere, const Room& room) const override;
+  void deliver_bytes(const std::vector<Letter>& letters, std::size_t bytes, const RoomFrom& room) const override;
 
  private:
   template <class Number, class Unite>

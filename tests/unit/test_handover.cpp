@@ -10,6 +10,7 @@
 #include <type_traits>
 
 #include "input_error.h"
+#include "tag_owners.h"
 #include "world_parts.h"
 
 namespace solidcull {
@@ -46,8 +47,8 @@ struct Whole {
   std::map<int, Vec3> places;                                      // by tag
   std::map<int, std::vector<double>> numbers;                      // of stored granules
   std::map<std::pair<std::int64_t, std::int64_t>, Vec3> contacts;  // as the lower tag sees it, world frame
-  std::set<std::int64_t> keys;                                             // of bodies
-  std::vector<int> tags_by_rank[4];
+  std::set<std::int64_t> keys;                                     // of bodies
+  std::vector<int> tags_by_rank[8];
 
   void add(SmallWorld& w, WorldParts& parts) {
     const std::lock_guard<std::mutex> lock(mutex);
@@ -307,7 +308,12 @@ std::multiset<std::vector<std::uint64_t>> rows_of(const File& file) {
   SmallWorld alone(ranks_along_x(1));
   const auto half = [&](std::size_t back) { return static_cast<std::uint64_t>(file.state[file.state.size() - back]); };
   SectionReader section(alone.ranks, file.end, half(7) << 32 | half(6));  // types, two radii and the check sum follow
-  for (SectionChunk chunk; section.next(chunk);) {
+  std::vector<ChunkPlace> chunks;
+  for (std::size_t p = 0; p < section.parts().size(); ++p)
+    for (const ChunkPlace& c : section.list(p)) chunks.push_back(c);
+  SectionChunk chunk;
+  for (const ChunkPlace& c : chunks) {
+    EXPECT_TRUE(section.read(c, chunk));
     const char *at = chunk.bytes.data(), *const end = at + chunk.bytes.size();
     const auto tables = [&](std::uint64_t n) {
       for (WordTable t; n > 0; --n) {
@@ -358,6 +364,170 @@ TEST(Snapshot, what_two_ranks_wrote_is_taken_up_by_any_number_of_ranks) {
     });
     expect_alike(read, written);
   }
+}
+
+/// 22 x 6 x 6 granules, one body that turns; every fifth is an interface granule, and histories are what they were.
+struct Slab {
+  explicit Slab(SmallWorld& w) : parts(w, sleeping_settings(), 2 * r) {
+    std::vector<std::int64_t> tags, stored;
+    for (int n = 0; n < 792; ++n) {
+      const int tag = 1 + 5 * n % 792;  // no order in space
+      w.add(tag, Vec3(-0.11, -0.03, -0.03) + apart * Vec3(n % 22, n / 22 % 6, n / 132), r, Vec3(0.01, 0, 1e-4 * (n % 22)),
+            Vec3(0, 0, 1e-2));
+      tags.push_back(tag);
+      if (tag % 5 != 0) stored.push_back(tag);
+    }
+    w.begin_run(nullptr);
+    w.steps(nullptr, 5);
+    w.reneighbour();
+    parts.lock(tags);
+    parts.put_away(stored);
+    parts.reneighbour();
+  }
+  WorldParts parts;
+};
+
+SmallDeck grid_of_ranks(const std::array<int, 3>& split) {
+  SmallDeck deck = ranks_along_x(1);
+  deck.split = split;
+  return deck;
+}
+
+/// Bytes that this thread has read from files; 0 where the system does not tell.
+std::uint64_t read_by_this_thread() {
+  std::ifstream in("/proc/thread-self/io");
+  std::string name;
+  std::uint64_t bytes = 0;
+  in >> name >> bytes;
+  return bytes;
+}
+
+/// Whoever reads gets, and reads, what is his, whatever the number of ranks and their grid.
+TEST(Snapshot, no_rank_gets_more_than_its_part) {
+  const std::vector<std::array<int, 3>> grids = {{1, 1, 1}, {2, 1, 1}, {1, 3, 1}, {4, 1, 1}, {2, 2, 1}, {2, 2, 2}};
+  for (const auto& written_on : grids) {
+    File file;
+    Whole written;
+    run_on_ranks(grid_of_ranks(written_on), [&](SmallWorld& w) {
+      Slab slab(w);
+      written.add(w, slab.parts);
+      file.write(w, slab.parts);
+    });
+    ASSERT_EQ(written.interior, 634);
+    ASSERT_GT(written.contacts.size(), 2000u);
+    const double section = static_cast<double>(bytes_of(file.end).size());
+    for (const auto& read_on : grids) {
+      Whole read;
+      double all_fetched = 0;
+      run_on_ranks(grid_of_ranks(read_on), [&](SmallWorld& w) {
+        WorldParts parts(w, sleeping_settings(), 2 * r);
+        const std::uint64_t before = read_by_this_thread();
+        w.ranks.delivered = 0;
+        file.read(w, parts);
+        const double received = static_cast<double>(w.ranks.delivered);
+        const double fetched = static_cast<double>(read_by_this_thread() - before);
+        const double here = static_cast<double>(parts.bed.solid.locked()) / 792 * section;
+        EXPECT_LT(received, 1.5 * here + 4096);
+        if (written_on == read_on || w.ranks.count == 1) {
+          EXPECT_EQ(received, 0);
+          EXPECT_LT(fetched, 1.1 * here + 4096);
+        }
+        {
+          const std::lock_guard<std::mutex> lock(read.mutex);
+          all_fetched += fetched;
+        }
+        parts.reneighbour();
+        read.add(w, parts);
+        EXPECT_NO_THROW(parts.invariants.check());
+      });
+      EXPECT_LT(all_fetched, 1.1 * section + 4096 * (read_on[0] * read_on[1] * read_on[2]));  // each chunk once
+      expect_alike(read, written);
+    }
+  }
+}
+
+/// As a program that lays beds may write it: contacts after all granules, with none of theirs.
+TEST(Snapshot, contacts_may_stand_with_neither_of_their_granules) {
+  File file;
+  Whole written;
+  run_on_ranks(ranks_along_x(1), [&](SmallWorld& w) {
+    Slab slab(w);
+    written.add(w, slab.parts);
+    file.write(w, slab.parts);
+  });
+  // the same section again, contacts of all chunks in one of their own
+  SmallWorld alone(ranks_along_x(1));
+  const auto half = [&](std::size_t back) { return static_cast<std::uint64_t>(file.state[file.state.size() - back]); };
+  const std::uint64_t identity = half(7) << 32 | half(6);
+  std::vector<SectionChunk> chunks;
+  SectionCounts counts;
+  {
+    SectionReader section(alone.ranks, file.end, identity);
+    counts = section.counts();
+    ChunkTables last;
+    for (const ChunkPlace& place : section.list(0)) {
+      SectionChunk chunk;
+      ASSERT_TRUE(section.read(place, chunk));
+      if (place.kind != SectionChunk::part) {
+        ChunkTables tables;
+        tables.read(chunk);
+        last.contacts.columns = tables.contacts.columns;
+        last.contacts.rows += tables.contacts.rows;
+        last.contacts.words.insert(last.contacts.words.end(), tables.contacts.words.begin(), tables.contacts.words.end());
+        tables.contacts.clear(tables.contacts.columns);
+        chunk.begin(chunk.kind, chunk.rank, chunk.granules);
+        tables.append_to(chunk);
+      }
+      chunks.push_back(chunk);
+    }
+    SectionChunk chunk;
+    chunk.begin(SectionChunk::interior_granules, 0, 0);
+    last.append_to(chunk);
+    chunks.push_back(chunk);
+  }
+  std::remove(file.end.c_str());
+  SectionWriter out(alone.ranks, file.end, identity);
+  for (const SectionChunk& chunk : chunks) EXPECT_TRUE(out.put(chunk));
+  EXPECT_FALSE(out.put({}));
+  out.close(counts);
+  for (const int ranks : {2, 3}) {
+    Whole read;
+    run_on_ranks(ranks_along_x(ranks), [&](SmallWorld& w) {
+      WorldParts parts(w, sleeping_settings(), 2 * r);
+      file.read(w, parts);
+      parts.reneighbour();
+      read.add(w, parts);
+      EXPECT_NO_THROW(parts.invariants.check());
+    });
+    expect_alike(read, written);
+  }
+}
+
+TEST(Ranks, letters_come_to_those_they_are_for) {
+  run_on_ranks(ranks_along_x(4), [](SmallWorld& w) {
+    const std::map<int, std::vector<int>> letters_to_nobody;
+    std::map<int, std::vector<int>> letters;
+    if (w.ranks.me != 2) letters[3] = {w.ranks.me, 7};
+    if (w.ranks.me == 3) letters[0] = {5};
+    const std::map<int, std::vector<int>> came = w.ranks.deliver(letters);
+    const std::map<int, std::vector<int>> to_0 = {{3, {5}}}, to_3 = {{0, {0, 7}}, {1, {1, 7}}, {3, {3, 7}}};
+    EXPECT_EQ(came, w.ranks.me == 0 ? to_0 : w.ranks.me == 3 ? to_3 : letters_to_nobody);
+  });
+}
+
+TEST(Ranks, whoever_knows_a_tag_finds_the_rank_that_has_it) {
+  run_on_ranks(ranks_along_x(3), [](SmallWorld& w) {
+    std::vector<std::int64_t> mine;
+    for (int tag = 1; tag < 30; ++tag)
+      if (tag / 10 == w.ranks.me) mine.push_back(tag);
+    const TagOwners owners(w.ranks, mine);
+    const std::vector<int> found =
+        owners.of(w.ranks.me == 1 ? std::vector<std::int64_t>{} : std::vector<std::int64_t>{29, 3, 30, 12, 3});
+    if (w.ranks.me == 1)
+      EXPECT_TRUE(found.empty());
+    else
+      EXPECT_EQ(found, (std::vector<int>{2, 0, TagOwners::nobody, 1, 0}));
+  });
 }
 
 TEST(Handover, contacts_that_join_bodies_of_one_rank_are_no_matter_of_the_next) {

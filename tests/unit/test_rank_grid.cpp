@@ -30,6 +30,16 @@ TEST(RankGrid, of_a_thousand_ranks_has_26_partners_at_most) {
   }
 }
 
+TEST(RankGrid, each_place_is_in_one_cell) {
+  for (const bool periodic : {false, true}) {
+    const RankGrid g = grid_of(4, 3, 2, periodic);
+    EXPECT_EQ(g.cell_of({0, 0, 0}), (RankGrid::Cell{0, 0, 0}));
+    EXPECT_EQ(g.cell_of({0.25, 1.0 / 3, 0.5}), (RankGrid::Cell{1, 1, 1}));  // a border is the next one's
+    EXPECT_EQ(g.cell_of({0.99, 0.99, 0.99}), (RankGrid::Cell{3, 2, 1}));
+  }
+  EXPECT_EQ(grid_of(4, 3, 2).cell_of({-5, 7, 0.2}), (RankGrid::Cell{0, 2, 0}));
+}
+
 TEST(RankGrid, two_cells_are_partners_of_each_other_by_opposite_shifts) {
   for (const bool periodic : {false, true})
     for (const double width : {0.01, 0.3, 0.6}) {

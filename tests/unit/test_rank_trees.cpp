@@ -55,6 +55,8 @@ class Crowd {
     // what trees do not ask for
     void sum(double*, int) const override { throw InternalError("sum"); }
     void sum(std::int64_t*, int) const override { throw InternalError("sum"); }
+    std::int64_t sum_before(std::int64_t) const override { throw InternalError("sum_before"); }
+    std::unique_ptr<SharedFile> open_to_write(const std::string&) const override { throw InternalError("open_to_write"); }
     void largest(double*, int) const override { throw InternalError("largest"); }
     void largest(std::int64_t*, int) const override { throw InternalError("largest"); }
     void begin_any(unsigned) const override {}
@@ -79,6 +81,7 @@ class Crowd {
     void exchange_bytes(const void*, std::size_t, std::size_t, double, const Room&) const override {
       throw InternalError("exchange");
     }
+    void deliver_bytes(const std::vector<Letter>&, std::size_t, const RoomFrom&) const override { throw InternalError("deliver"); }
     void gather_bytes(const void*, std::size_t, std::size_t, bool, const Room&) const override { throw InternalError("gather"); }
 
    private:

@@ -12,9 +12,10 @@ import tiles
 from solidcull_runs.errors import RunError
 
 BEGINS, ENDS = b"SDCULLB1", b"SDCULLE1"
+END = 72                                                 # bytes of a section's end
 PART, INTERFACE, INTERIOR = 1, 2, 3                      # kinds of chunks
 ONE, MOST, FEW, LIKE, NARROW, PLAIN = range(6)           # ways to keep a column
-MARK = 20261129.0                                        # of the fix's numbers
+MARK = 20261202.0                                        # of the fix's numbers
 (STATE_MARK, STATE_SIZE, STATE_INTERIOR, STATE_DIAMETER) = range(1, 5)
 STATE_COUNTERS, STATE_WIDTH, STATE_RANKS, STATE_STEP, STATE_NO_PLACES, STATE_SECTION, STATE_IDENTITY, STATE_TYPES = 9, 15, 16, 17, 18, 19, 20, 22
 HIGH, LOW = 0xffffffff00000000, 0xffffffff
@@ -115,34 +116,44 @@ class Section:
     def __init__(self, file):
         self.file = open(file, "rb")
         size = self.file.seek(0, 2)
-        if size >= 64:
-            self.file.seek(size - 64)
-        end = self.file.read(64)
-        if len(end) < 64 or end[:8] != ENDS:
+        if size >= END:
+            self.file.seek(size - END)
+        end = self.file.read(END)
+        if len(end) < END or end[:8] != ENDS:
             raise CulledFileError(f"{file} holds no culled granules at its end: write it with the fix solid/cull, and copy it whole")
-        self.identity, self.length, self.chunk_count, self.interior, self.interface, self.contacts, total = struct.unpack("<7Q", end[8:])
-        if total != section_sum(words_of(end[:56])) or self.length > size:
+        self.identity, self.length, parts, _, self.interior, self.interface, self.contacts, total = struct.unpack("<8Q", end[8:])
+        table = b""
+        if self.length <= size and 32 * parts < self.length:
+            self.file.seek(size - END - 32 * parts)
+            table = self.file.read(32 * parts)
+        if len(table) != 32 * parts or total != section_sum(words_of(table + end[:-8])):
             raise CulledFileError(f"{file} is damaged at its end")
         self.start, self.name = size - self.length, file
+        self.parts = list(struct.iter_unpack("<4Q", table))
 
     def chunks(self):
-        """Kind, rank, granules and bytes of each."""
-        self.file.seek(self.start + 16)
-        for _ in range(self.chunk_count):
-            head = self.file.read(40)
-            kind, rank, granules, size, total = struct.unpack("<5Q", head)
-            data = self.file.read(size)
-            with np.errstate(over="ignore"):
-                if len(data) != size or total != section_sum(words_of(data)) + section_sum(words_of(head[:32])):
-                    raise CulledFileError(f"{self.name} is damaged among its granules")
-            yield kind, rank, granules, data
+        """Kind, rank, granules and bytes of each, parts one after the other."""
+        for place, count, _, _ in self.parts:
+            self.file.seek(self.start + place)
+            rows = self.file.read(32 * count)
+            if self.file.read(8) != struct.pack("<Q", int(section_sum(words_of(rows)))):
+                raise CulledFileError(f"{self.name} is damaged among its granules")
+            for at, _, _, _ in struct.iter_unpack("<4Q", rows):
+                self.file.seek(self.start + at)
+                head = self.file.read(40)
+                kind, rank, granules, size, total = struct.unpack("<5Q", head)
+                data = self.file.read(size)
+                with np.errstate(over="ignore"):
+                    if len(data) != size or total != section_sum(words_of(data)) + section_sum(words_of(head[:32])):
+                        raise CulledFileError(f"{self.name} is damaged among its granules")
+                yield kind, rank, granules, data
 
 
 class SectionWriter:
-    """Appends a section to a file that is open."""
+    """Appends a section of one part to a file that is open."""
 
     def __init__(self, file, identity):
-        self.file, self.identity, self.bytes, self.count = file, identity, 16, 0
+        self.file, self.identity, self.bytes, self.rows = file, identity, 16, []
         file.write(BEGINS + struct.pack("<Q", identity))
 
     def put(self, kind, granules, *tables):
@@ -152,11 +163,15 @@ class SectionWriter:
         with np.errstate(over="ignore"):
             total = section_sum(words_of(data)) + section_sum(words_of(head))
         self.file.write(head + struct.pack("<Q", int(total)) + data)
+        self.rows.append((self.bytes, 40 + len(data), kind, granules))
         self.bytes += 40 + len(data)
-        self.count += 1
 
     def close(self, interior, interface, contacts):
-        end = ENDS + struct.pack("<6Q", self.identity, self.bytes + 64, self.count, interior, interface, contacts)
+        rows = b"".join(struct.pack("<4Q", *row) for row in self.rows)
+        self.file.write(rows + struct.pack("<Q", int(section_sum(words_of(rows)))))
+        table = struct.pack("<4Q", self.bytes, len(self.rows), sum(row[1] for row in self.rows), sum(row[3] for row in self.rows))
+        length = self.bytes + len(rows) + 8 + len(table) + END
+        end = table + ENDS + struct.pack("<7Q", self.identity, length, 1, len(self.rows), interior, interface, contacts)
         self.file.write(end + struct.pack("<Q", int(section_sum(words_of(end)))))
 
 

@@ -401,7 +401,7 @@ def contacts_of(source, bodies, place, like, index, copies):
 def write_part(out, source, bodies, sides, top):
     low = -2 * tiles.GRANULE
     pose = [0, 0, 0, 0, 0, 0, 1]
-    row = [low, low, low, sides[0] - low, sides[1] - low, top, *pose, *pose]
+    row = [low, low, low, sides[0] - low, sides[1] - low, top, *pose, *pose, 0, 0, 0, *sides, top]
     table = bodies.table()
     out.put(files.PART, 0, files.packed_table(list(words(np.array(row)).reshape(-1, 1)), 1),
             files.packed_table(source.layouts, len(source.layouts[0])), files.packed_table(list(words(table.T)), len(table)))
