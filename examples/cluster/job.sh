@@ -7,6 +7,7 @@
 #SBATCH --signal=TERM@300           # 300 s before that, LIGGGHTS is told to write a restart file and end
 #SBATCH --requeue                   # a job whose node has failed is started again, and goes on
 #SBATCH --output=strike.%j.txt
+#SBATCH --open-mode=append
 set -euo pipefail
 
 program=${SOLIDCULL_LAUNCHER:-liggghts-solidcull}
