@@ -30,7 +30,7 @@ SCENES = {"impact": 1, "blade": 2}     # the tool, as bed.in calls it
 
 @dataclass
 class Effort:
-    strong: tuple = (27, 27, 28)   # granules along x, y, z of the one bed
+    strong: tuple = (28, 28, 26)   # granules along x, y, z of the one bed; even numbers, so that no cut goes through a granule
     tile: tuple = (20, 20, 12)     # of each rank's part, where the bed grows with the ranks
     before: int = 150
     steps: int = 300
