@@ -198,8 +198,8 @@ def table(name, records):
 
 
 def text_of(records):
-    """All tables, to be printed."""
-    return "\n".join(f"{name}\n\n{table(name, records)}" for name in TABLES)
+    """All tables that have rows, to be printed."""
+    return "\n".join(f"{name}\n\n{table(name, records)}" for name, rows_of in TABLES.items() if rows_of(records)[1])
 
 
 def draw(records, file):
