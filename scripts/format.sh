@@ -10,7 +10,7 @@ if [ "$version" != 14 ]; then
   echo "format: clang-format 14 is needed, and here is ${version:-none}: apt-get install clang-format on Debian 12" >&2
   exit 77
 fi
-mapfile -t files < <(find benchmarks fix_solid_cull region_interface_mesh tests \( -name '*.cpp' -o -name '*.h' \) -not -path '*/out/*' | sort)
+mapfile -t files < <(find benchmarks fix_solid_cull region_interface_mesh tests validation \( -name '*.cpp' -o -name '*.h' \) -not -path '*/out/*' | sort)
 if [ "${1:-}" = --fix ]; then
   clang-format -i "${files[@]}"
 else

@@ -28,14 +28,14 @@ def recipe_of(file):
     return Path(file).with_suffix(".recipe").read_text()
 
 
-def settled(file, deck, sources=(), variables=None, writes="restart", more="", **how):
+def settled(file, deck, sources=(), variables=None, writes="restart", more="", ranks=1, **how):
     """A bed, settled by a deck in the deck's own folder. `sources`: files that the deck reads; `writes`: the deck's variable that
     names the restart file; `more`: what else the bed is made of."""
     deck, given = Path(deck), dict(variables or {})
     recipe = "\n".join([json.dumps(given, default=str), *(Path(f).read_text() for f in (deck, *sources)), more])
 
     def make(part):
-        run_liggghts(deck, deck.parent, Path(file).with_suffix(".log"), {**given, writes: os.path.relpath(part, deck.parent)})
+        run_liggghts(deck, deck.parent, Path(file).with_suffix(".log"), {**given, writes: os.path.relpath(part, deck.parent)}, ranks)
     return made(file, recipe, make, **how)
 
 

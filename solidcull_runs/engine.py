@@ -143,6 +143,6 @@ class Process:
             self.waiter.join()
 
 
-def run_liggghts(deck, folder, log, variables=None):
+def run_liggghts(deck, folder, log, variables=None, ranks=1):
     """Runs a deck in a folder, everything that it prints in the file `log`; that text."""
-    return Process(find_launcher(), deck, folder, log, variables).wait()
+    return Process(find_launcher(), deck, folder, log, variables, ranks).wait()

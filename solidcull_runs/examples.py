@@ -37,7 +37,9 @@ class Example:
     vary: tuple = None       # a variable and its value in each pair of runs, in place of moving all granules
     runs: int = 3            # of each kind
     at_once: int = 1
+    ranks: int = 1           # of each run
     prepare: object = None   # prepare(out): before anything is run
+    after: object = None     # after(example, variables, runs, few) -> (text, whether all is well): what it shows besides
     text: object = field(default=lambda result, runs: tables.explained(result))  # what is printed
 
     @property
@@ -51,7 +53,7 @@ class Example:
         """The bed at rest; made the first time."""
         out = self.folder(few)
         return settled(out / "bed.restart", self.here / self.bed, [self.here / f for f in self.sources],
-                       {"folder": out.relative_to(self.here), **(self.few_bed if few else {})},
+                       {"folder": out.relative_to(self.here), **(self.few_bed if few else {})}, ranks=self.ranks,
                        say=lambda line: print(line if few else f"{self.bed_takes}, only the first time", flush=True))
 
     def files_job(self, variables, few):
@@ -61,7 +63,7 @@ class Example:
         keywords = f"{few and self.few_keywords or ''} bed {every} {at}/bed.*.vtp mesh {every} {at}/mesh.*.vtp"
         if self.vdb_every:
             keywords += f" mesh {every if few else self.vdb_every} {at}/mesh.*.vdb"
-        return Job(self.here / self.deck, out, "files", 0, variables, shifted=False, keywords=keywords, name="files")
+        return Job(self.here / self.deck, out, "files", 0, variables, self.ranks, shifted=False, keywords=keywords, name="files")
 
 
 def load(name):
@@ -112,16 +114,19 @@ def main(example):
     n = (1, 1) if a.few_steps else (a.unculled, a.culled)
     print(f"{n[0]} unculled and {n[1]} culled runs of {steps:,} steps in turns, {a.at_once} at once", flush=True)
     result, runs = compare(example.here / example.deck, example.wanted, out=out, unculled=n[0], culled=n[1], vary=example.vary,
-                           variables=variables, extra=lambda run: example.figures(run, out), at_once=a.at_once, steps=steps,
+                           variables=variables, ranks=example.ranks, extra=lambda run: example.figures(run, out), at_once=a.at_once, steps=steps,
                            granules=granules, keywords=example.few_keywords if a.few_steps else None, also=[example.files_job(variables, a.few_steps)],
                            say=lambda line: print("  " + line, flush=True))
     if a.few_steps:
         few_steps.check(runs, granules, steps)
-    text = example.text(result, runs)
+    text, well = example.text(result, runs), True
+    if example.after:
+        more, well = example.after(example, variables, runs, a.few_steps)
+        text += "\n\n" + more
     (out / "twin.json").write_text(json.dumps(result, indent=1) + "\n")
     (out / "table.txt").write_text(text + "\n")
     print(f"\n{text}\n", flush=True)
     example.plot(runs, out / "plot.png")
     drawn = draw(example, out, runs)
     print(f"plot: {out / 'plot.png'}\n" + (f"pictures: {out / 'cut-away.png'}" if drawn else f"no pictures: the fix wrote no {out / 'bed.*.vtp'}"))
-    return 1 if not drawn or is_lost(result["ledger"]) else 0
+    return 1 if not (drawn and well) or is_lost(result["ledger"]) else 0

@@ -128,10 +128,21 @@ class Examples(Scripts):
         self.assertTrue(result["metrics"]["left on the plate"]["good"], result["metrics"]["left on the plate"])
         self.assertEqual(result["metrics"]["granules outside"]["culled"], [0])
 
+    def test_cluster(self):
+        """Its job is killed and goes on: example.py itself ends with 1 if a granule, an id or a mass is not there then."""
+        result, ends = self.example("cluster")
+        self.nothing_lost(result, 1801)
+        self.close(result, 0.02, "c_ballz", "c_ballz:min", "v_force:max")
+        balls = [end[end["radius"] > examples.load("cluster").STRIKER] for end in ends]
+        self.assertEqual([len(ball) for ball in balls], [1, 1])
+        self.assertGreater(result["metrics"]["v_force:max"]["mean"], balls[0]["mass"][0] * GRAVITY, "the ball has not struck the bed")
+        told = (ROOT / "examples" / "cluster" / "out" / "few" / "job" / "job.txt").read_text()
+        self.assertRegex(told, r"(?s)job.sh: begins with out/bed.restart.*job.sh: goes on with out/strike.\d+.restart")
+
     def test_an_unknown_example(self):
         done = subprocess.run([str(ROOT / "examples" / "run.sh"), "nowhere"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.assertEqual((done.returncode, done.stdout), (2, ""))
-        self.assertIn("no example 'nowhere'; there is: drum falling_mass impact plate_discharge", done.stderr)
+        self.assertIn("no example 'nowhere'; there is: cluster drum falling_mass impact plate_discharge", done.stderr)
 
 
 class Validation(Scripts):
@@ -217,6 +228,23 @@ class Validation(Scripts):
                 self.assertLess(c["exterior"], 700)
                 self.close(c, 0.02, "floor load, largest (N)")
         self.assertEqual(tools["tiny pour"]["movers"], 20, "those that are poured move, and no other")
+
+    def test_scaling(self):
+        few = ROOT / "validation" / "scaling" / "out" / "few"
+        shutil.rmtree(few / "runs", ignore_errors=True)  # figures of this launcher
+        records = self.run_script(few.parents[1] / "scaling.py", few / "scaling.json")
+        self.assertEqual([(r["what"], r["scene"]) for r in records], [("counts", "impact"), ("counts", "blade"), ("counts", "impact"), ("times", "impact")])
+        for r in records[:3]:
+            with self.subTest(scene=r["scene"], way=r["way"]):
+                self.assertEqual((r["ranks"], r["steps"], r["looks"]), (2, 50, 2))
+                self.assertGreater(r["builds"], 0)
+                for who in ("plug-in", "liggghts"):
+                    self.assertEqual(r[who]["partners"]["most"], 1, "two ranks have one partner each")
+                    self.assertGreater(r[who]["received"]["mean"], 0)
+                self.assertGreaterEqual(r["atoms"]["most"], r["atoms"]["mean"])
+                self.assertEqual(r["plug-in"]["file reads"], 0)
+        for file in ("scaling.txt", "model.png"):
+            self.assertGreater((few / file).stat().st_size, 0)
 
     def test_no_harm(self):
         few = ROOT / "validation" / "no_harm" / "out" / "few"

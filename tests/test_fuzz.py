@@ -1,5 +1,7 @@
 """Twenty random decks with solid/cull against stock LIGGGHTS; and that the fuzzer sees what it is for."""
 import copy
+import math
+import re
 import sys
 import tempfile
 import unittest
@@ -69,8 +71,9 @@ class RandomDecks(unittest.TestCase):
         with tempfile.TemporaryDirectory(prefix="solidcull-fuzz-") as folder:
             for seed in WENT_WRONG:
                 with self.subTest(seed=seed):
-                    verdict = fuzz.verdict_of(grammar.make(seed, more=False), Path(folder) / str(seed))
-                    self.assertFalse(verdict.fails(), f"{verdict.kind}: {verdict.text}\ntests/fuzz/fuzz.py --plain --seed {seed} --count 1")
+                    verdict = fuzz.verdict_of(grammar.make(seed, ranks=grammar.FEW_RANKS, more=False), Path(folder) / str(seed))
+                    self.assertFalse(verdict.fails(), f"{verdict.kind}: {verdict.text}\ntests/fuzz/fuzz.py --plain --seed {seed} --count 1 --ranks "
+                                     f"{','.join(map(str, grammar.FEW_RANKS))}")
 
     def test_sums_that_are_right_of_their_own_bed(self):
         """A number that the fix changes when it restores is held against it, one that stays is not."""
@@ -101,6 +104,29 @@ class Grammar(unittest.TestCase):
         for culled in (False, True):
             self.assertEqual(grammar.make(7).text(0, culled), grammar.make(7).text(0, culled))
         self.assertNotEqual(grammar.make(7).text(0, True), grammar.make(8).text(0, True))
+
+    def test_grids(self):
+        """Each grid is of so many ranks; most decks are on few of them."""
+        for n in range(1, 9):
+            grids = grammar.grids_of(n)
+            self.assertEqual({math.prod(map(int, g.split())) for g in grids if "*" not in g} or {1}, {n})
+            self.assertEqual(len(set(grids)), len(grids))
+        self.assertEqual([len(grammar.grids_of(n)) for n in (5, 6, 7, 8)], [4, 10, 4, 11])
+        ranks = [grammar.make(seed).ranks[0] for seed in range(200)]
+        self.assertEqual(set(ranks), set(range(1, 9)))
+        self.assertGreater(sum(n <= 4 for n in ranks), 150)
+
+    def test_balance_changes_nothing_else_of_a_deck(self):
+        before, found = grammar.BALANCE_IS_THERE, 0
+        self.addCleanup(setattr, grammar, "BALANCE_IS_THERE", before)
+        for seed in range(20):
+            texts = []
+            for grammar.BALANCE_IS_THERE in (False, True):
+                texts.append(grammar.make(seed).text(0, True))
+            self.assertNotIn("balance", texts[0])
+            found += "balance" in texts[1]
+            self.assertEqual(texts[0], re.sub(r" balance \d+ [\d.]+", "", texts[1]))
+        self.assertGreater(found, 5)
 
     def test_decks_have_all_that_more_has(self):
         text = "".join(grammar.make(seed, library=seed % 2 == 0).text(0, True) for seed in range(200))

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Random small decks, each run by stock LIGGGHTS and with solid/cull.
 
-    tests/fuzz/fuzz.py --seed S --count N [--ranks 1,2,3,4] [--between none|harmless|all] [--library some|all|none] [--keep DIR] [--shrink]
+    tests/fuzz/fuzz.py --seed S --count N [--ranks 1,2,4,8] [--between none|harmless|all] [--library some|all|none] [--keep DIR] [--shrink]
 
 Deck k has the seed S + k. A deck that comes out wrong is printed in one line with its seed, and kept in DIR with its logs
 (default: build/fuzz). `--shrink` looks for the smallest deck that fails the same way, and prints it. `--print` prints decks and runs
@@ -80,7 +80,7 @@ def main(argv=None):
     p = argparse.ArgumentParser(prog="fuzz.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--seed", type=int, default=1)
     p.add_argument("--count", type=int, default=20)
-    p.add_argument("--ranks", metavar="LIST", help="numbers of ranks to choose from (default 1 to 4)")
+    p.add_argument("--ranks", metavar="LIST", help="numbers of ranks to choose from (default 1 to 8, mostly 1 to 4)")
     p.add_argument("--between", choices=grammar.BETWEEN, default="all", help="commands between runs")
     p.add_argument("--plain", action="store_true", help="without streams, sums over contacts, other contact models and loops of short runs")
     p.add_argument("--library", choices=("some", "all", "none"), default="some", help="decks that go by the C library (default: one of five)")

@@ -1,4 +1,6 @@
 """Small decks as users write them, at random."""
+import itertools
+import math
 import random
 
 from decks import CullLine, Deck, Part
@@ -9,6 +11,16 @@ MOST = 400         # granules
 DENSITY = 2500     # kg/m^3
 SEEDS = (15485863, 15485867, 32452843, 32452867, 49979687, 67867967)  # LIGGGHTS takes primes
 BETWEEN = ("none", "harmless", "all")
+FEW_RANKS = (1, 1, 2, 2, 3, 4)  # numbers to choose from, as often as they stand here
+RANKS = 3 * FEW_RANKS + (5, 6, 7, 8)
+BALANCE_IS_THERE = False        # whether the fix knows `balance N THRESHOLD`
+
+
+def grids_of(n):
+    """All grids of n ranks, and LIGGGHTS's own choice."""
+    kept = {2: ["2 1 1", "1 2 1", "1 1 2"], 3: ["3 1 1", "1 3 1", "1 1 3"], 4: ["2 2 1", "2 1 2", "1 2 2", "4 1 1", "1 1 4"]}  # so that seeds keep their decks
+    whole = [" ".join(map(str, grid)) for grid in itertools.product(range(1, n + 1), repeat=3) if math.prod(grid) == n]
+    return [*([] if n == 1 else kept.get(n, whole)), "* * *"]
 
 
 def region_in(rng, box, low, high):
@@ -26,6 +38,7 @@ class Grammar(MoreEvents):
 
     def __init__(self, seed, between="all", ranks=None, more=True, library=None):
         self.rng = random.Random(f"solidcull {seed}")
+        self.rng_of_balance = random.Random(f"balance {seed}")  # its own, so that a deck is otherwise the same without it
         self.seed, self.between, self.ranks = seed, between, ranks
         self.more = more and between == "all"
         self.library = self.more and (self.chance(0.2) if library is None else library)
@@ -80,10 +93,8 @@ class Grammar(MoreEvents):
         return Deck(self.seed, [r for r, _ in self.ranks_of], self.files, self.traits)
 
     def pick_ranks(self):
-        n = self.rng.choice(self.ranks or (1, 1, 2, 2, 3, 4))
-        grids = {1: ["* * *"], 2: ["2 1 1", "1 2 1", "1 1 2", "* * *"], 3: ["3 1 1", "1 3 1", "1 1 3", "* * *"],
-                 4: ["2 2 1", "2 1 2", "1 2 2", "4 1 1", "1 1 4", "* * *"]}
-        return n, self.rng.choice(grids[n])
+        n = self.rng.choice(self.ranks or RANKS)
+        return n, self.rng.choice(grids_of(n))
 
     def model(self):
         rng = self.rng
@@ -246,8 +257,12 @@ class Grammar(MoreEvents):
                 words.append(rng.choice(choices))
         return words
 
+    def balance(self):
+        rng = self.rng_of_balance
+        return [f"balance {rng.choice((10, 50, 100))} {rng.choice((1.05, 1.2, 2))}"] if BALANCE_IS_THERE and rng.random() < 0.5 else []
+
     def cull(self):
-        self.parts.append(CullLine([], needed=True, keywords=self.keywords()))
+        self.parts.append(CullLine([], needed=True, keywords=self.keywords() + self.balance()))
         self.culling = True
 
     # --- what happens then
