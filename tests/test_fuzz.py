@@ -1,7 +1,6 @@
 """Twenty random decks with solid/cull against stock LIGGGHTS; and that the fuzzer sees what it is for."""
 import copy
 import math
-import re
 import sys
 import tempfile
 import unittest
@@ -116,17 +115,9 @@ class Grammar(unittest.TestCase):
         self.assertEqual(set(ranks), set(range(1, 9)))
         self.assertGreater(sum(n <= 4 for n in ranks), 150)
 
-    def test_balance_changes_nothing_else_of_a_deck(self):
-        before, found = grammar.BALANCE_IS_THERE, 0
-        self.addCleanup(setattr, grammar, "BALANCE_IS_THERE", before)
-        for seed in range(20):
-            texts = []
-            for grammar.BALANCE_IS_THERE in (False, True):
-                texts.append(grammar.make(seed).text(0, True))
-            self.assertNotIn("balance", texts[0])
-            found += "balance" in texts[1]
-            self.assertEqual(texts[0], re.sub(r" balance \d+ [\d.]+", "", texts[1]))
-        self.assertGreater(found, 5)
+    def test_half_of_the_decks_move_cuts_between_ranks(self):
+        with_it = sum(" balance " in grammar.make(seed).text(0, True) for seed in range(100))
+        self.assertTrue(30 < with_it < 70, with_it)
 
     def test_decks_have_all_that_more_has(self):
         text = "".join(grammar.make(seed, library=seed % 2 == 0).text(0, True) for seed in range(200))

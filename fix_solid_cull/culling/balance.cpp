@@ -43,8 +43,21 @@ bool Balance::look(std::int64_t step) {
   const Settings& s = bed_.scales.settings();
   if (s.balance_every == 0 || bed_.ranks.count == 1 || step % s.balance_every != 0) return false;
   imbalance_ = measure();
+  ++compared_;
+  sum_ += imbalance_;
+  largest_ = std::max(largest_, imbalance_);
   due_ = imbalance_ > s.balance_threshold;
   return due_;
+}
+
+std::string Balance::end_run() {
+  if (compared_ == 0) return {};
+  char text[160];
+  std::snprintf(text, sizeof text, "cuts between ranks moved %d times; the most loaded rank had %.2f times the mean work on average, %.2f at most",
+                moves_, sum_ / compared_, largest_);
+  moves_ = compared_ = 0;
+  sum_ = largest_ = 0;
+  return text;
 }
 
 bool Balance::move() {

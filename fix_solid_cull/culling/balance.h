@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "bed.h"
 
@@ -17,17 +18,17 @@ class Balance {
   /// Moves them, where look() said so. True if some moved. Collective.
   bool move();
 
-  int moves() const { return moves_; }
-  /// The largest work of a rank over the mean, when they were compared last; 0: not yet.
-  double imbalance() const { return imbalance_; }
+  /// What the run's comparisons have found, in words; empty where there were none. The next run begins anew. Local.
+  std::string end_run();
 
  private:
   double measure() const;
 
   const Bed& bed_;
   bool due_ = false;
-  double imbalance_ = 0;
-  int moves_ = 0;
+  double imbalance_ = 0;  // largest work of a rank over the mean, when they were compared last
+  int moves_ = 0, compared_ = 0;
+  double sum_ = 0, largest_ = 0;  // of the run's imbalances
 };
 
 }  // namespace solidcull

@@ -27,7 +27,7 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       balance(bed),
       meter(bed),
       report(bed, motion, meter),
-      run_end(bed, meter, report),
+      run_end(bed, meter, report, balance),
       files(bed, meshes, report),
       invariants(bed),
       followers{&bed.shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown} {

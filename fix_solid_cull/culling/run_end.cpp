@@ -1,5 +1,6 @@
 #include "run_end.h"
 
+#include <string>
 #include <vector>
 
 #include "run_summary.h"
@@ -15,7 +16,10 @@ void RunEnd::tell() {
   run.runs = meter_.compared();
   run.times_less = meter_.times_less();
   if (run.work.steps > 0) bed_.run.say(text_of(run, bed_.scales.settings()));
-  if (bed_.scales.settings().report == ReportLength::full) report_.tell_counters();
+  const std::string balanced = balance_.end_run();
+  if (bed_.scales.settings().report != ReportLength::full) return;
+  report_.tell_counters();
+  if (!balanced.empty()) bed_.run.say(balanced);
 }
 
 }  // namespace solidcull

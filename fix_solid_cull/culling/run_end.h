@@ -1,6 +1,7 @@
 // The end of a run: what the user is told, in a few lines.
 #pragma once
 
+#include "balance.h"
 #include "bed.h"
 #include "report.h"
 #include "work_meter.h"
@@ -9,7 +10,8 @@ namespace solidcull {
 
 class RunEnd {
  public:
-  RunEnd(const Bed& bed, WorkMeter& meter, Report& report) : bed_(bed), meter_(meter), report_(report) {}
+  RunEnd(const Bed& bed, WorkMeter& meter, Report& report, Balance& balance)
+      : bed_(bed), meter_(meter), report_(report), balance_(balance) {}
 
   /// Nothing after a run of no step; with `report full`, all counters too, after any. Collective.
   void tell();
@@ -18,6 +20,7 @@ class RunEnd {
   const Bed& bed_;
   WorkMeter& meter_;
   Report& report_;
+  Balance& balance_;
 };
 
 }  // namespace solidcull

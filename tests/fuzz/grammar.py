@@ -13,7 +13,6 @@ SEEDS = (15485863, 15485867, 32452843, 32452867, 49979687, 67867967)  # LIGGGHTS
 BETWEEN = ("none", "harmless", "all")
 FEW_RANKS = (1, 1, 2, 2, 3, 4)  # numbers to choose from, as often as they stand here
 RANKS = 3 * FEW_RANKS + (5, 6, 7, 8)
-BALANCE_IS_THERE = False        # whether the fix knows `balance N THRESHOLD`
 
 
 def grids_of(n):
@@ -259,7 +258,7 @@ class Grammar(MoreEvents):
 
     def balance(self):
         rng = self.rng_of_balance
-        return [f"balance {rng.choice((10, 50, 100))} {rng.choice((1.05, 1.2, 2))}"] if BALANCE_IS_THERE and rng.random() < 0.5 else []
+        return [f"balance {rng.choice((10, 50, 100))} {rng.choice((1.05, 1.2, 2))}"] if rng.random() < 0.5 else []
 
     def cull(self):
         self.parts.append(CullLine([], needed=True, keywords=self.keywords() + self.balance()))
