@@ -231,8 +231,8 @@ class Insertions {
 class SharedFile {
  public:
   virtual ~SharedFile() = default;
-  virtual std::uint64_t size() const = 0;                                       ///< as it was found, alike on all ranks
-  virtual void write(std::uint64_t at, const void* from, std::size_t n) = 0;    ///< Local
+  virtual std::uint64_t size() const = 0;                                     ///< as it was found, alike on all ranks
+  virtual void write(std::uint64_t at, const void* from, std::size_t n) = 0;  ///< Local
   /// What was written is on the disk: 0, or the errno of what went wrong on this rank. Collective.
   virtual int close() = 0;
 };

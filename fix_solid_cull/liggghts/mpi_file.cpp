@@ -1,5 +1,9 @@
 #include "mpi_file.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
 
@@ -75,6 +79,37 @@ int MpiFile::close() {
   note(MPI_File_sync(file_));
   note(MPI_File_close(&file_));
   file_ = MPI_FILE_NULL;
+  return error_;
+}
+
+OneRanksFile::OneRanksFile(const std::string& file) : file_(::open(file.c_str(), O_WRONLY)) {
+  struct stat there {};
+  if (file_ < 0 || ::fstat(file_, &there) != 0) error_ = errno;
+  size_ = static_cast<std::uint64_t>(there.st_size);
+}
+
+OneRanksFile::~OneRanksFile() {
+  if (file_ >= 0) ::close(file_);
+}
+
+void OneRanksFile::write(std::uint64_t at, const void* from, std::size_t n) {
+  for (const char* bytes = static_cast<const char*>(from); n > 0 && error_ == 0;) {
+    const ssize_t written = ::pwrite(file_, bytes, n, static_cast<off_t>(at));
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) {
+      error_ = written < 0 ? errno : ENOSPC;
+      return;
+    }
+    at += static_cast<std::uint64_t>(written);
+    bytes += written;
+    n -= static_cast<std::size_t>(written);
+  }
+}
+
+int OneRanksFile::close() {
+  if (error_ == 0 && ::fsync(file_) != 0 && errno != EINVAL && errno != EROFS) error_ = errno;  // some know no fsync
+  if (file_ >= 0 && ::close(file_) != 0 && error_ == 0) error_ = errno;
+  file_ = -1;
   return error_;
 }
 

@@ -351,6 +351,7 @@ void EngineRanks::deliver_bytes(const std::vector<Letter>& letters, std::size_t 
 }
 
 std::unique_ptr<SharedFile> EngineRanks::open_to_write(const std::string& file) const {
+  if (count == 1) return std::make_unique<OneRanksFile>(file);
   return std::make_unique<MpiFile>(world, file);
 }
 
