@@ -1,39 +1,32 @@
-// Where a box is to be cut so that all ranks along an axis have the same work.
+// Where a box is to be cut among a grid of ranks so that none of them has much more work than the others.
 #pragma once
 
-#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <vector>
 
 namespace solidcull {
 
-/// cuts: as they are (m), ascending, both ends of the box among them, which stay; work: in equal slices from end to end. The cuts
-/// that part it evenly, as near as these hold: none goes past where a neighbouring one was, so that nothing changes over to a rank
-/// that is no neighbour; no two are nearer than `thinnest` (m). As they were, where they cannot be that far apart, or there is no
-/// work.
-inline std::vector<double> balanced_cuts(const std::vector<double>& cuts, const std::vector<double>& work, double thinnest) {
-  const std::size_t parts = cuts.size() - 1;
-  const double lo = cuts.front(), edge = cuts.back() - lo, slice = edge / static_cast<double>(work.size());
-  double all = 0;
-  for (const double w : work) all += w;
-  std::vector<double> moved = cuts;
-  if (parts < 2 || !(all > 0)) return moved;
-  double below = 0;
-  std::size_t s = 0;
-  for (std::size_t k = 1; k < parts; ++k) {
-    const double wanted = all * static_cast<double>(k) / static_cast<double>(parts);
-    while (s + 1 < work.size() && below + work[s] < wanted) below += work[s++];
-    const double within = work[s] > 0 ? std::clamp((wanted - below) / work[s], 0.0, 1.0) : 0.0;
-    moved[k] = std::clamp(lo + (static_cast<double>(s) + within) * slice, cuts[k - 1], cuts[k + 1]);
-  }
-  // apart, from both ends
-  for (std::size_t k = 1; k < parts; ++k) moved[k] = std::max(moved[k], moved[k - 1] + thinnest);
-  for (std::size_t k = parts - 1; k > 0; --k) moved[k] = std::min(moved[k], moved[k + 1] - thinnest);
-  for (std::size_t k = 1; k <= parts; ++k) {
-    const bool within = k == parts || (moved[k] >= cuts[k - 1] && moved[k] <= cuts[k + 1]);
-    if (!within || moved[k] - moved[k - 1] < thinnest * (1 - 1e-9)) return cuts;
-  }
-  return moved;
-}
+/// Cuts along each axis, ascending, both ends of the box among them (m).
+using Cuts = std::array<std::vector<double>, 3>;
+
+/// Work in bins of a box, spread evenly in each.
+struct WorkGrid {
+  Cuts edges;                ///< of the bins
+  std::vector<double> work;  ///< of bin (i, j, k) at (i * bins(1) + j) * bins(2) + k
+
+  std::size_t bins(int axis) const { return edges[static_cast<std::size_t>(axis)].size() - 1; }
+};
+
+/// Edges that part what `slices`, equally thick from lo to hi, hold into `bins` of about the same.
+std::vector<double> even_edges(double lo, double hi, const std::vector<double>& slices, std::size_t bins);
+
+/// Cuts at which the most loaded rank has little more than the mean, as far as straight cuts can, and as these hold: no cut goes
+/// past where a neighbouring one was, so that nothing changes over to a rank that is no neighbour, and no two are nearer than
+/// `thinnest` (m). The ends stay.
+Cuts balanced_cuts(const Cuts& cuts, const WorkGrid& grid, double thinnest);
+
+/// Largest work of a rank over the mean.
+double imbalance(const Cuts& cuts, const WorkGrid& grid);
 
 }  // namespace solidcull

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "balanced_cuts.h"
 #include "bed.h"
 
 namespace solidcull {
@@ -23,12 +24,13 @@ class Balance {
 
  private:
   double measure() const;
+  WorkGrid work_in(const Cuts& cuts) const;
 
   const Bed& bed_;
   bool due_ = false;
   double imbalance_ = 0;  // largest work of a rank over the mean, when they were compared last
-  int moves_ = 0, compared_ = 0;
-  double sum_ = 0, largest_ = 0;  // of the run's imbalances
+  int moves_ = 0, compared_ = 0;  // in this run; compared since the first move, if there was one
+  double sum_ = 0, largest_ = 0;  // of those imbalances
 };
 
 }  // namespace solidcull

@@ -47,7 +47,7 @@ void BodyGroups::group() {
   trees_.clear();
   if (bed_.ranks.count == 1) return;
   struct End {
-    Triple at;
+    Triple at;     // in the box
     Triple place;  // in the image of its body
     std::int64_t low, high;
     int rank, body;
@@ -59,8 +59,8 @@ void BodyGroups::group() {
     if (!body) return;
     bed_.solid.contacts().for_each_partner(tag, [&](std::int64_t partner) {
       if (bodies.body_of(partner)) return;
-      const Triple x = triple(bodies.pose(body).to_world(masses_(tag).position));
-      ends.push_back({x, x, std::min(tag, partner), std::max(tag, partner), bed_.ranks.me, body});
+      const Vec3 x = bodies.pose(body).to_world(masses_(tag).position);
+      ends.push_back({triple(bed_.run.wrapped(x)), triple(x), std::min(tag, partner), std::max(tag, partner), bed_.ranks.me, body});
     });
   };
   for (int i = 0; i < bed_.atoms.owned; ++i)

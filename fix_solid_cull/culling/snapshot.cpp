@@ -162,7 +162,7 @@ void Snapshot::take_up() {
   if (h[has_section] == 0) return;
   const std::uint64_t identity = joined(h + identity_high);
   bed_.index.index(bed_.atoms);
-  if (bed_.ranks.any(bed_.ranks.subdomain_changed())) bed_.ranks.update();
+  if (bed_.ranks.subdomains_changed()) bed_.ranks.update();
   SectionReader section(bed_.ranks, file_, identity);
   const bool as_it_was = static_cast<int>(h[ranks]) == bed_.ranks.count &&
                          section.parts().size() == static_cast<std::size_t>(bed_.ranks.count) && stands_as_it_was(section);

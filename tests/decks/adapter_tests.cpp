@@ -103,7 +103,7 @@ TEST_P(RanksNear, EachPlaceHasOneOwner) {
   e.run(read_bed(small(GetParam())) + "run 0\n");
   EngineRanks ranks(e.lammps());
   ranks.update();
-  EXPECT_FALSE(ranks.subdomain_changed());
+  EXPECT_FALSE(ranks.subdomains_changed());
   const std::vector<Row> all = ranks.gather(rows_of(e));
   std::vector<std::int64_t> owners;
   for (const Row& r : all)

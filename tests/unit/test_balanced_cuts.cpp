@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "balanced_cuts.h"
@@ -8,60 +9,89 @@
 namespace solidcull {
 namespace {
 
-using Cuts = std::vector<double>;
+std::vector<double> evenly(double lo, double hi, int parts) {
+  std::vector<double> at;
+  for (int k = 0; k <= parts; ++k) at.push_back(lo + (hi - lo) * k / parts);
+  return at;
+}
 
-/// Work between two places, spread evenly in each slice.
-double between(const Cuts& work, double edge, double lo, double hi) {
-  const double slice = edge / static_cast<double>(work.size());
-  double sum = 0;
-  for (std::size_t s = 0; s < work.size(); ++s) {
-    const double from = std::max(lo, static_cast<double>(s) * slice), to = std::min(hi, static_cast<double>(s + 1) * slice);
-    if (to > from) sum += work[s] * (to - from) / slice;
+/// work(x, y, z) at the middle of each of n^3 bins of a box of edge 1.
+template <class Work>
+WorkGrid grid_of(int n, Work work) {
+  WorkGrid grid;
+  for (auto& e : grid.edges) e = evenly(0, 1, n);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+      for (int k = 0; k < n; ++k) grid.work.push_back(work((i + 0.5) / n, (j + 0.5) / n, (k + 0.5) / n));
+  return grid;
+}
+
+Cuts even_cuts(int x, int y, int z) { return {evenly(0, 1, x), evenly(0, 1, y), evenly(0, 1, z)}; }
+
+/// As a run would, a few times.
+Cuts settled(Cuts cuts, const WorkGrid& grid, double thinnest) {
+  for (int move = 0; move < 10; ++move) {
+    const Cuts before = cuts;
+    cuts = balanced_cuts(cuts, grid, thinnest);
+    for (int d = 0; d < 3; ++d)
+      for (std::size_t k = 1; k + 1 < cuts[d].size(); ++k) {
+        EXPECT_GE(cuts[d][k], before[d][k - 1]);
+        EXPECT_LE(cuts[d][k], before[d][k + 1]);
+        EXPECT_GE(cuts[d][k] - cuts[d][k - 1], thinnest * (1 - 1e-9));
+      }
   }
-  return sum;
+  return cuts;
 }
 
 TEST(BalancedCuts, even_work_leaves_even_cuts_where_they_are) {
-  const Cuts even = {0, 1, 2, 3, 4};
-  const Cuts moved = balanced_cuts(even, Cuts(40, 1.0), 0.1);
-  for (std::size_t k = 0; k < even.size(); ++k) EXPECT_NEAR(moved[k], even[k], 1e-12);
+  const WorkGrid even = grid_of(12, [](double, double, double) { return 1.0; });
+  const Cuts cuts = even_cuts(4, 3, 1), moved = balanced_cuts(cuts, even, 0.01);
+  for (int d = 0; d < 3; ++d)
+    for (std::size_t k = 0; k < cuts[d].size(); ++k) EXPECT_NEAR(moved[d][k], cuts[d][k], 1e-9);
+  EXPECT_NEAR(imbalance(cuts, even), 1, 1e-12);
 }
 
-TEST(BalancedCuts, all_parts_get_the_same_work_after_a_few_moves) {
+TEST(BalancedCuts, along_one_axis_all_ranks_get_the_same) {
   std::mt19937 random(4);
-  std::uniform_real_distribution<double> some(0, 1);
-  for (int trial = 0; trial < 100; ++trial) {
-    const std::size_t parts = 2 + trial % 6;
-    Cuts work(100), cuts;
-    for (double& w : work) w = some(random);
-    for (std::size_t k = 0; k <= parts; ++k) cuts.push_back(10.0 * static_cast<double>(k) / static_cast<double>(parts));
-    for (int move = 0; move < 20; ++move) {
-      const Cuts before = cuts;
-      cuts = balanced_cuts(cuts, work, 1e-3);
-      for (std::size_t k = 1; k < parts; ++k) {
-        EXPECT_GE(cuts[k], before[k - 1]);
-        EXPECT_LE(cuts[k], before[k + 1]);
-        EXPECT_LT(cuts[k - 1], cuts[k]);
-      }
-    }
-    const double share = between(work, 10, 0, 10) / static_cast<double>(parts);
-    for (std::size_t k = 0; k < parts; ++k) EXPECT_NEAR(between(work, 10, cuts[k], cuts[k + 1]), share, 1e-9 * share);
+  std::uniform_real_distribution<double> some(0.1, 1);
+  for (int parts = 2; parts < 8; ++parts) {
+    std::vector<double> of(16);
+    for (double& w : of) w = some(random);
+    const WorkGrid grid = grid_of(16, [&](double x, double, double) { return of[static_cast<std::size_t>(x * 16)]; });
+    EXPECT_NEAR(imbalance(settled(even_cuts(parts, 1, 1), grid, 1e-3), grid), 1, 0.01) << parts;
   }
 }
 
-TEST(BalancedCuts, a_heap_in_one_corner_draws_them_near_but_no_nearer_than_they_may_be) {
-  Cuts work(100, 0.0);
-  work[0] = 1;
-  Cuts cuts = {0, 1, 2, 3, 4};
-  for (int move = 0; move < 10; ++move) cuts = balanced_cuts(cuts, work, 0.2);
-  const Cuts due = {0, 0.2, 0.4, 0.6, 4};
-  for (std::size_t k = 0; k < due.size(); ++k) EXPECT_NEAR(cuts[k], due[k], 1e-12) << k;
+TEST(BalancedCuts, a_blow_in_a_corner_is_shared_by_eight_ranks) {
+  const WorkGrid grid = grid_of(16, [](double x, double y, double z) {
+    return std::hypot(x - 0.2, y - 0.2, z - 0.9) < 0.5 ? 1.0 : 0.02;
+  });
+  const Cuts cuts = even_cuts(2, 2, 2);
+  EXPECT_GT(imbalance(cuts, grid), 2);
+  EXPECT_LT(imbalance(settled(cuts, grid, 0.05), grid), 1.1);
 }
 
-TEST(BalancedCuts, what_cannot_be_cut_stays_as_it_is) {
-  EXPECT_EQ(balanced_cuts({0, 1, 2}, {0, 0, 0}, 0.1), Cuts({0, 1, 2}));   // no work
-  EXPECT_EQ(balanced_cuts({0, 1, 2}, {1, 0, 0}, 1.5), Cuts({0, 1, 2}));   // too thick
-  EXPECT_EQ(balanced_cuts({0, 2}, {1, 0, 0}, 0.1), Cuts({0, 2}));         // one rank
+TEST(BalancedCuts, work_along_a_diagonal_is_shared_as_well_as_cuts_through_the_box_can) {
+  // halves of equal work along x and y leave all of it to two of four ranks: no straight cuts do better than that by much
+  const WorkGrid grid = grid_of(16, [](double x, double y, double) { return std::abs(x - y) < 0.1 ? 1.0 : 0.0; });
+  EXPECT_LT(imbalance(settled(even_cuts(2, 2, 1), grid, 0.05), grid), 2.01);
+}
+
+TEST(BalancedCuts, no_two_are_nearer_than_they_may_be) {
+  const WorkGrid heap = grid_of(20, [](double x, double, double) { return x < 0.05 ? 1.0 : 0.0; });
+  const Cuts cuts = settled(even_cuts(4, 1, 1), heap, 0.04);
+  for (std::size_t k = 1; k < cuts[0].size(); ++k) EXPECT_GE(cuts[0][k] - cuts[0][k - 1], 0.04 * (1 - 1e-9));
+  EXPECT_LT(cuts[0][1], 0.05);
+  const Cuts thick = even_cuts(4, 1, 1);
+  EXPECT_EQ(balanced_cuts(thick, heap, 0.3)[0], thick[0]) << "they are nearer than that already";
+}
+
+TEST(BalancedCuts, edges_of_bins_part_the_work_evenly) {
+  const std::vector<double> edges = even_edges(1, 2, {0, 0, 4, 4, 0, 0, 0, 0, 0, 0}, 4);
+  const std::vector<double> due = {1, 1.25, 1.3, 1.35, 2};
+  ASSERT_EQ(edges.size(), due.size());
+  for (std::size_t k = 0; k < due.size(); ++k) EXPECT_NEAR(edges[k], due[k], 1e-12);
+  EXPECT_EQ(even_edges(0, 1, {0, 0}, 4), (std::vector<double>{0, 1}));
 }
 
 }  // namespace

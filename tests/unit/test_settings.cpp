@@ -50,6 +50,8 @@ void expect_same(const Settings& a, const Settings& b) {
   EXPECT_EQ(a.store, b.store);
   EXPECT_EQ(a.restore, b.restore);
   EXPECT_EQ(a.voxel, b.voxel);
+  EXPECT_EQ(a.balance_every, b.balance_every);
+  EXPECT_EQ(a.balance_threshold, b.balance_threshold);
   EXPECT_EQ(a.report, b.report);
   EXPECT_EQ(listed(a.meshes), listed(b.meshes));
   EXPECT_EQ(listed(a.beds), listed(b.beds));
@@ -96,12 +98,14 @@ TEST(Settings, every_keyword_is_parsed) {
   due.carve_radius = 1.5;
   due.carve_cap = 6;
   due.voxel = 0.25;
+  due.balance_every = 1000;
+  due.balance_threshold = 1.2;
   due.report = ReportLength::full;
   due.meshes = {{100, "out/mesh.*.vdb"}};
   due.beds = {{200, "bed.vtp"}};
   const std::string line =
       "every 40 depth 3.5 exterior live speed 1e-3 calm 5 tolerance 0.5 0.1 carve 1.5 6 store exact "
-      "restore exact voxel 0.25 report full mesh 100 out/mesh.*.vdb bed 200 bed.vtp";
+      "restore exact voxel 0.25 balance 1000 1.2 report full mesh 100 out/mesh.*.vdb bed 200 bed.vtp";
   expect_same(parsed(line), due);
   std::set<std::string> named;
   for (const std::string& w : words(line)) named.insert(w);
@@ -231,6 +235,16 @@ const Refusal refusals[] = {
     {"voxel 2.1", "keyword 'voxel' has the value '2.1': give a size in mean diameters, 0.1 to 2"},
     {"voxel fine", "keyword 'voxel' has the value 'fine': give a size in mean diameters, 0.1 to 2"},
     {"voxel", "keyword 'voxel' ends too early: give a size in mean diameters, 0.1 to 2"},
+
+    {"balance 0 1.1",
+     "keyword 'balance' has the value '0': give a whole number of steps, 1 or more, and the largest work of a rank over the "
+     "mean, more than 1"},
+    {"balance 100 1",
+     "keyword 'balance' has the value '1': give a whole number of steps, 1 or more, and the largest work of a rank over the "
+     "mean, more than 1"},
+    {"balance 100",
+     "keyword 'balance' ends too early: give a whole number of steps, 1 or more, and the largest work of a rank over the mean, "
+     "more than 1"},
 
     {"report long", "keyword 'report' has the value 'long': give 'short' or 'full'"},
     {"report", "keyword 'report' ends too early: give 'short' or 'full'"},
