@@ -78,7 +78,6 @@ std::vector<WallLoad> MeshLoads::of(std::int64_t tag) {
 /// -1: this rank does not have it.
 int MeshLoads::index_of(Mesh& mesh, int element) {
   LAMMPS_NS::TriMesh& triangles = *mesh.fix->triMesh();
-  if (element < 0) return -1;
   const std::size_t k = static_cast<std::size_t>(element);
   if (k >= mesh.last.size()) mesh.last.resize(k + 1, -1);
   int& last = mesh.last[k];
@@ -90,6 +89,7 @@ int MeshLoads::index_of(Mesh& mesh, int element) {
 void MeshLoads::press(int mesh, int element, const Vec3& force, const Vec3& torque) {
   if (static_cast<std::size_t>(mesh) >= meshes_.size() || !meshes_[mesh].fix) return;  // taken out of the deck since
   Mesh& m = meshes_[static_cast<std::size_t>(mesh)];
+  if (element < 0 || element >= m.fix->triMesh()->sizeGlobal()) return;
   double f[3], t[3];
   set(f, force);
   set(t, torque);

@@ -32,8 +32,8 @@ class MeshLoads : protected LAMMPS_NS::Pointers {
   /// What still elements did to the granule in this step.
   std::vector<WallLoad> of(std::int64_t tag);
 
-  /// A mesh element bears this in addition (N, N m about the mesh's point of reference); where this rank has it no more the mesh
-  /// does. After the engine's wall forces and before it sums them.
+  /// A mesh element bears this in addition (N, N m about the mesh's point of reference); where another rank has it, the mesh as a
+  /// whole does; one that has gone bears nothing. After the engine's wall forces and before it sums them.
   void press(int mesh, int element, const Vec3& force, const Vec3& torque);
 
   /// A wall granule's contact, told by the engine's own call, see register_styles.cpp.

@@ -243,10 +243,6 @@ void EngineRanks::exchange_bytes(const void* rows, std::size_t n, std::size_t by
     strays = strays || is_far_out(vec(row.at));
     near_borders.push_back(row);
   }
-  if (strays && !far_out_ && getenv("DBG")) {
-    for (const Row& row : near_borders)
-      if (is_far_out(vec(row.at))) { printf("DBG stray %g %g %g own %g %g %g - %g %g %g bytes %zu width %g rank %d\n", row.at[0],row.at[1],row.at[2],lo_[0],lo_[1],lo_[2],hi_[0],hi_[1],hi_[2],bytes,width,me); fflush(stdout); }
-  }
   if (Invariants::asked() && !far_out_ && any(strays)) throw InternalError("rows are far outside of their subdomain");
   const std::vector<Partner>& all =
       partners(far_out_ ? std::numeric_limits<double>::infinity() : width + neighbor->cutneighmax);
