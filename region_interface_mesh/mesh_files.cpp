@@ -9,10 +9,18 @@
 #include <limits>
 #include <numeric>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
 #include "whole_file.h"
 
 namespace solidcull {
+
+const char* const poly_data_begins =
+    "<?xml version=\"1.0\"?>\n"
+    "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
+    "  <PolyData>\n";
+const char* const poly_data_ends = "  </PolyData>\n</VTKFile>\n";
 
 static_assert(sizeof(float) == 4 && sizeof(int) == 4, "the files hold 32-bit numbers");
 
@@ -24,7 +32,7 @@ void check_folder_of(const std::string& file) {
 
 // --- WholeFile --------------------------------------------------------------------------------------------------
 
-WholeFile::WholeFile(const std::string& file) : file_(file), part_(file + ".part") {
+WholeFile::WholeFile(const std::string& file) : file_(file), part_(part_of(file)) {
   stream_ = std::fopen(part_.c_str(), "wb");
   if (!stream_) fail(std::strerror(errno));
 }
@@ -57,10 +65,17 @@ namespace {
 
 // --- base64, as VTK reads it ----------------------------------------------------------------------------------------
 
+/// What is written to, where it is no file.
+struct Text {
+  std::string all;
+  void write(std::string_view more) { all += more; }
+};
+
 /// Encodes a stream of bytes piece by piece; VTK wants the length and the data of an array in one such stream.
+template <class To>
 class Base64 {
  public:
-  explicit Base64(WholeFile& file) : file_(file) { text_.reserve(flush_at + 4); }
+  explicit Base64(To& file) : file_(file) { text_.reserve(flush_at + 4); }
 
   void put(const void* data, std::size_t bytes) {
     const auto* byte = static_cast<const unsigned char*>(data);
@@ -100,7 +115,7 @@ class Base64 {
     text_.clear();
   }
 
-  WholeFile& file_;
+  To& file_;
   std::string text_;
   unsigned char group_[3] = {};
   int filled_ = 0;
@@ -121,11 +136,11 @@ constexpr const char* vtk_type<std::int64_t>() {
   return "Int64";
 }
 
-template <class T>
-void write_array(WholeFile& file, const std::string& name, const std::vector<T>& values, int components = 1) {
+template <class To, class T>
+void write_array(To& file, const std::string& name, const std::vector<T>& values, int components = 1) {
   file.write(std::string("        <DataArray type=\"") + vtk_type<T>() + "\" Name=\"" + name + "\" NumberOfComponents=\"" +
              std::to_string(components) + "\" format=\"binary\">");
-  Base64 encoded(file);
+  Base64<To> encoded(file);
   const std::uint64_t bytes = values.size() * sizeof(T);
   encoded.put(&bytes, sizeof bytes);
   encoded.put(values.data(), bytes);
@@ -134,7 +149,8 @@ void write_array(WholeFile& file, const std::string& name, const std::vector<T>&
 }
 
 /// On many ranks bodies have numbers that an Int32 does not hold.
-void write_numbers_of_bodies(WholeFile& file, const std::vector<std::int64_t>& body) {
+template <class To>
+void write_numbers_of_bodies(To& file, const std::vector<std::int64_t>& body) {
   const bool narrow = std::all_of(body.begin(), body.end(), [](std::int64_t b) { return b == static_cast<int>(b); });
   if (narrow)
     write_array(file, "body", std::vector<int>(body.begin(), body.end()));
@@ -142,25 +158,27 @@ void write_numbers_of_bodies(WholeFile& file, const std::vector<std::int64_t>& b
     write_array(file, "body", body);
 }
 
-void begin_poly_data(WholeFile& file, std::size_t points, std::size_t verts, std::size_t polys) {
-  file.write(
-      "<?xml version=\"1.0\"?>\n"
-      "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
-      "  <PolyData>\n    <Piece NumberOfPoints=\"" +
-      std::to_string(points) + "\" NumberOfVerts=\"" + std::to_string(verts) +
+template <class To>
+void begin_piece(To& file, std::size_t points, std::size_t verts, std::size_t polys) {
+  file.write("    <Piece NumberOfPoints=\"" + std::to_string(points) + "\" NumberOfVerts=\"" + std::to_string(verts) +
       "\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" + std::to_string(polys) + "\">\n");
 }
 
-void end_poly_data(WholeFile& file) { file.write("    </Piece>\n  </PolyData>\n</VTKFile>\n"); }
+template <class To>
+void end_piece(To& file) {
+  file.write("    </Piece>\n");
+}
 
-void write_points(WholeFile& file, const std::vector<float>& position) {
+template <class To>
+void write_points(To& file, const std::vector<float>& position) {
   file.write("      <Points>\n");
   write_array(file, "Points", position, 3);
   file.write("      </Points>\n");
 }
 
 /// Cells of equal size: their point indices one after another, and where each cell ends.
-void write_cells(WholeFile& file, const std::string& kind, const std::vector<std::int64_t>& connectivity, int size) {
+template <class To>
+void write_cells(To& file, const std::string& kind, const std::vector<std::int64_t>& connectivity, int size) {
   std::vector<std::int64_t> ends(connectivity.size() / size);
   for (std::size_t n = 0; n < ends.size(); ++n) ends[n] = static_cast<std::int64_t>(n + 1) * size;
   file.write("      <" + kind + ">\n");
@@ -213,7 +231,8 @@ void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vec
   for (const auto& t : mesh.triangles) connectivity.insert(connectivity.end(), t.begin(), t.end());
 
   WholeFile out(file);
-  begin_poly_data(out, mesh.vertices.size(), 0, mesh.triangles.size());
+  out.write(poly_data_begins);
+  begin_piece(out, mesh.vertices.size(), 0, mesh.triangles.size());
   if (!body_of_triangle.empty()) {
     out.write("      <CellData Scalars=\"body\">\n");
     write_numbers_of_bodies(out, body_of_triangle);
@@ -221,31 +240,53 @@ void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vec
   }
   write_points(out, position);
   write_cells(out, "Polys", connectivity, 3);
-  end_poly_data(out);
+  end_piece(out);
+  out.write(poly_data_ends);
   out.commit();
 }
 
-void write_bed_vtp(const std::string& file, const BedTable& bed) {
+namespace {
+
+/// wide: bodies are numbered alike in all parts of a file.
+template <class To>
+void write_bed_piece(To& out, const BedTable& bed, bool wide) {
   const std::size_t n = bed.radius.size();
   const bool whole = bed.position.size() == 3 * n && bed.velocity.size() == 3 * n && bed.tag.size() == n &&
                      bed.type.size() == n && bed.state.size() == n && bed.body.size() == n;
-  if (!whole) throw std::invalid_argument("write_bed_vtp: the columns of the bed differ in length");
+  if (!whole) throw std::invalid_argument("a bed file: the columns of the bed differ in length");
   std::vector<std::int64_t> connectivity(n);
   std::iota(connectivity.begin(), connectivity.end(), 0);
 
-  WholeFile out(file);
-  begin_poly_data(out, n, n, 0);
+  begin_piece(out, n, n, 0);
   out.write("      <PointData Scalars=\"state\" Vectors=\"velocity\">\n");
   write_array(out, "radius", bed.radius);
   write_array(out, "velocity", bed.velocity, 3);
   write_array(out, "tag", bed.tag);
   write_array(out, "type", bed.type);
   write_array(out, "state", bed.state);
-  write_numbers_of_bodies(out, bed.body);
+  if (wide)
+    write_array(out, "body", bed.body);
+  else
+    write_numbers_of_bodies(out, bed.body);
   out.write("      </PointData>\n");
   write_points(out, bed.position);
   write_cells(out, "Verts", connectivity, 1);
-  end_poly_data(out);
+  end_piece(out);
+}
+
+}  // namespace
+
+std::string bed_piece(const BedTable& bed) {
+  Text text;
+  write_bed_piece(text, bed, true);
+  return std::move(text.all);
+}
+
+void write_bed_vtp(const std::string& file, const BedTable& bed) {
+  WholeFile out(file);
+  out.write(poly_data_begins);
+  write_bed_piece(out, bed, false);
+  out.write(poly_data_ends);
   out.commit();
 }
 

@@ -36,5 +36,8 @@ struct BedTable {
 /// VTK XML PolyData of points (one vertex cell each) with point arrays radius, velocity, tag, type, state, body.
 /// Arrays are inline base64 ("binary"), header_type UInt64, uncompressed, little endian.
 void write_bed_vtp(const std::string& file, const BedTable& bed);
+/// The same in parts, one behind the other: what stands before the first one and behind the last, and a part. Local.
+extern const char *const poly_data_begins, *const poly_data_ends;
+std::string bed_piece(const BedTable& bed);
 
 }  // namespace solidcull

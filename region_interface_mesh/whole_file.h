@@ -24,6 +24,7 @@ class WholeFile {
   void commit();
 
   const std::string& part() const { return part_; }
+  static std::string part_of(const std::string& file) { return file + ".part"; }
   [[noreturn]] void fail(const std::string& reason) const;
 
  private:

@@ -16,11 +16,21 @@ VTK_TYPES = {"Float32": "<f4", "Float64": "<f8", "Int8": "<i1", "UInt8": "<u1", 
 
 
 def read_vtp(file):
-    """A VTK PolyData file (inline base64, UInt64 headers, uncompressed): {"points", "polys" (triangles), every array by name}."""
+    """A VTK PolyData file (inline base64, UInt64 headers, uncompressed), in one piece or one of each rank: {"points", "polys"
+    (triangles), every array by name}."""
     root = xml.parse(file).getroot()
     if root.get("type") != "PolyData" or root.get("header_type") != "UInt64" or root.get("compressor"):
         raise ValueError(f"{file}: not an uncompressed PolyData file with UInt64 headers")
-    piece = root.find("PolyData/Piece")
+    pieces = [arrays_of(piece) for piece in root.findall("PolyData/Piece")]
+    if len(pieces) == 1:
+        return pieces[0]
+    pieces = [p for p in pieces if len(p["tag"])] or pieces[:1]  # a rank may have nothing
+    joined = {name: np.concatenate([p[name] for p in pieces]) for name in pieces[0]}
+    order = np.argsort(joined["tag"], kind="stable")
+    return {name: values[order] for name, values in joined.items()}
+
+
+def arrays_of(piece):
     arrays = {}
     for part in ("Points", "PointData", "CellData", "Polys"):
         for a in piece.findall(f"{part}/DataArray"):

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cstring>
 #include <exception>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "input_error.h"
 #include "mesh_files.h"
+#include "whole_file.h"
 
 namespace solidcull {
 
@@ -164,22 +167,44 @@ void OutputFiles::write_bed(const std::string& file) {
     rows.push_back({triple(bed_.run.wrapped(x)), triple(bed_.solid.bodies().body(g.body).twist.at(x)), g.radius, g.tag,
                     bed_.groups.key_of(g.body), bed_.solid.store().get(g.tag).type, static_cast<int>(GranuleState::interior)});
   });
-  rows = bed_.ranks.gather_on_root(rows);
-  on_root("bed", [&] {
-    std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.tag < b.tag; });
-    BedTable bed;
-    for (const Row& r : rows) {
-      for (int d = 0; d < 3; ++d) {
-        bed.position.push_back(static_cast<float>(r.x[d]));
-        bed.velocity.push_back(static_cast<float>(r.v[d]));
-      }
-      bed.radius.push_back(static_cast<float>(r.radius));
-      bed.tag.push_back(static_cast<int>(r.tag));
-      bed.type.push_back(r.type);
-      bed.state.push_back(r.state);
-      bed.body.push_back(r.body);
+  std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.tag < b.tag; });
+  BedTable bed;
+  for (const Row& r : rows) {
+    for (int d = 0; d < 3; ++d) {
+      bed.position.push_back(static_cast<float>(r.x[d]));
+      bed.velocity.push_back(static_cast<float>(r.v[d]));
     }
-    write_bed_vtp(file, bed);
+    bed.radius.push_back(static_cast<float>(r.radius));
+    bed.tag.push_back(static_cast<int>(r.tag));
+    bed.type.push_back(r.type);
+    bed.state.push_back(r.state);
+    bed.body.push_back(r.body);
+  }
+  if (bed_.ranks.count == 1)
+    on_root("bed", [&] { write_bed_vtp(file, bed); });
+  else
+    write_in_parts("bed", file, bed_piece(bed), poly_data_begins, poly_data_ends);
+}
+
+/// Each rank its own, one behind the other: none holds more than that.
+void OutputFiles::write_in_parts(const char* keyword, const std::string& file, std::string text, const std::string& begins,
+                                 const std::string& ends) {
+  const Ranks& ranks = bed_.ranks;
+  std::unique_ptr<WholeFile> whole;
+  on_root(keyword, [&] {
+    whole = std::make_unique<WholeFile>(file);
+    whole->close();
+  });
+  if (ranks.me == 0) text = begins + text;
+  if (ranks.me == ranks.count - 1) text += ends;
+  const std::int64_t before = ranks.sum_before(static_cast<std::int64_t>(text.size()));
+  const std::unique_ptr<SharedFile> shared = ranks.open_to_write(WholeFile::part_of(file));
+  shared->write(static_cast<std::uint64_t>(before), text.data(), text.size());
+  std::int64_t error = shared->close();
+  ranks.largest(&error, 1);
+  on_root(keyword, [&] {
+    if (error) whole->fail(std::strerror(static_cast<int>(error)));
+    whole->commit();
   });
 }
 

@@ -31,6 +31,8 @@ class OutputFiles {
   std::string file_of_step(const std::string& pattern) const;
   template <class Write>
   void on_root(const char* keyword, Write write);
+  void write_in_parts(const char* keyword, const std::string& file, std::string text, const std::string& begins,
+                      const std::string& ends);
 
   Bed& bed_;
   BodyMeshes& meshes_;
