@@ -21,7 +21,7 @@ FLOORS = [
                                                                "EngineRanks", "EngineRun", "EngineMemory"]]),
     ("culling/", "decides and acts", "#dfe8f7", [
         ["Culling"],
-        ["Look", "Change", "BetweenRuns"],
+        ["Look", "Change", "BetweenRuns", "RankTrees", "Balance"],
         ["WallSurvey", "Survey", "Cover", "Pacing", "Grounding", "WakeRequests", "EffectiveGravity"],
         ["Shell", "BodyMotion", "BodyGroups", "MembershipChange", "ContactFreezing", "DeepGranules", "StoreExchange"],
         ["ShellClosure", "Refill", "Handover", "Parcels", "Snapshot", "BodyMeshes", "Report"]]),
