@@ -161,7 +161,7 @@ void write_numbers_of_bodies(To& file, const std::vector<std::int64_t>& body) {
 template <class To>
 void begin_piece(To& file, std::size_t points, std::size_t verts, std::size_t polys) {
   file.write("    <Piece NumberOfPoints=\"" + std::to_string(points) + "\" NumberOfVerts=\"" + std::to_string(verts) +
-      "\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" + std::to_string(polys) + "\">\n");
+             "\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" + std::to_string(polys) + "\">\n");
 }
 
 template <class To>

@@ -14,8 +14,8 @@ void check_folder_of(const std::string& file);
 /// Binary STL; throws std::runtime_error naming the file and the reason if it cannot be written. Local.
 void write_stl(const std::string& file, const TriangleMesh& mesh);
 
-/// VTK XML PolyData of triangles with one cell array "body" (empty, or one value per triangle), Int32 where that holds all values, else Int64.
-/// Local.
+/// VTK XML PolyData of triangles with one cell array "body" (empty, or one value per triangle), Int32 where that holds all
+/// values, else Int64. Local.
 void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<std::int64_t>& body_of_triangle);
 
 /// OpenVDB file with one level-set grid per mesh, named by `names`. Local.

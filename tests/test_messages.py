@@ -254,6 +254,7 @@ class KeywordRefusals(Case):
     MESH = "a file name that ends with .vdb, .stl or .vtp"
     BED = "a file name that ends with .vtp"
     # words after `solid/cull`: keyword that is named, its value (None: missing), what to give
+    BALANCE = "a whole number of steps, 1 or more, and the largest work of a rank over the mean, more than 1"
     WRONG = {
         "every 1.5": ("every", "1.5", STEPS), "every 0": ("every", "0", STEPS), "every": ("every", None, STEPS),
         "depth deep": ("depth", "deep", DEPTH), "depth -1": ("depth", "-1", DEPTH), "depth 51": ("depth", "51", DEPTH),
@@ -269,6 +270,7 @@ class KeywordRefusals(Case):
         "report all": ("report", "all", "'short' or 'full'"), "report": ("report", None, "'short' or 'full'"),
         "voxel fine": ("voxel", "fine", VOXEL), "voxel 0.05": ("voxel", "0.05", VOXEL), "voxel": ("voxel", None, VOXEL),
         "mesh x a.stl": ("mesh", "x", FILE), "mesh 10 a.obj": ("mesh", "a.obj", MESH), "mesh 10": ("mesh", None, MESH),
+        "balance 0 1.1": ("balance", "0", BALANCE), "balance 50 1": ("balance", "1", BALANCE), "balance 50": ("balance", None, BALANCE),
         "bed 0 a.vtp": ("bed", "0", FILE), "bed 10 a.stl": ("bed", "a.stl", BED), "bed": ("bed", None, FILE),
     }
     KEYWORDS = "balance, bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, store, tolerance, voxel"

@@ -9,14 +9,15 @@ namespace solidcull {
 namespace {
 
 constexpr int sweeps = 8, samples = 16, narrowings = 12;
-// What is made least is the sum of the ranks' works to this power: nearly the largest of them, but it also falls where a cut makes
-// room for another one to relieve the most loaded rank. The largest alone does not, and cuts would stop half way.
+// What is made least is the sum of the ranks' works to this power: nearly the largest of them, but it also falls where a cut
+// makes room for another one to relieve the most loaded rank. The largest alone does not, and cuts would stop half way.
 constexpr int power = 8;
 
 using Sums = std::vector<std::vector<double>>;  // of each column of cells along an axis: work up to each edge of its bins
 
 /// The share of each bin that lies in each cell, as rows of (cell, share): nearly all bins lie in one.
-std::vector<std::vector<std::pair<std::size_t, double>>> shares(const std::vector<double>& edges, const std::vector<double>& cuts) {
+std::vector<std::vector<std::pair<std::size_t, double>>> shares(const std::vector<double>& edges,
+                                                                const std::vector<double>& cuts) {
   std::vector<std::vector<std::pair<std::size_t, double>>> all(edges.size() - 1);
   for (std::size_t b = 0; b + 1 < edges.size(); ++b)
     for (std::size_t c = 0; c + 1 < cuts.size(); ++c) {
@@ -31,7 +32,8 @@ Sums sums_along(int axis, const Cuts& cuts, const WorkGrid& grid) {
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;
   const auto in_u = shares(grid.edges[static_cast<std::size_t>(u)], cuts[static_cast<std::size_t>(u)]);
   const auto in_v = shares(grid.edges[static_cast<std::size_t>(v)], cuts[static_cast<std::size_t>(v)]);
-  const std::size_t across = cuts[static_cast<std::size_t>(v)].size() - 1, columns = (cuts[static_cast<std::size_t>(u)].size() - 1) * across;
+  const std::size_t across = cuts[static_cast<std::size_t>(v)].size() - 1,
+                    columns = (cuts[static_cast<std::size_t>(u)].size() - 1) * across;
   Sums sums(columns, std::vector<double>(grid.bins(axis) + 1, 0.0));
   std::array<std::size_t, 3> at{};
   std::size_t bin = 0;
@@ -81,7 +83,8 @@ Cuts descend(Cuts cuts, const Cuts& before, const WorkGrid& grid, double thinnes
       if (now.size() <= 2) continue;
       const Sums sums = sums_along(static_cast<int>(axis), cuts, grid);
       for (std::size_t k = 1; k + 1 < now.size(); ++k) {
-        double lo = std::max(now[k - 1] + thinnest, before[axis][k - 1]), hi = std::min(now[k + 1] - thinnest, before[axis][k + 1]);
+        double lo = std::max(now[k - 1] + thinnest, before[axis][k - 1]),
+               hi = std::min(now[k + 1] - thinnest, before[axis][k + 1]);
         if (lo >= hi) continue;
         double best = now[k], least = load_at(best, now[k - 1], now[k + 1], edges, sums);
         for (int narrowing = 0; narrowing < narrowings; ++narrowing) {
@@ -156,7 +159,8 @@ double imbalance(const Cuts& cuts, const WorkGrid& grid) {
   if (!(all > 0)) return 1;
   const Sums sums = sums_along(0, cuts, grid);
   double most = 0;
-  for (std::size_t k = 1; k < cuts[0].size(); ++k) most = std::max(most, most_between(cuts[0][k - 1], cuts[0][k], grid.edges[0], sums));
+  for (std::size_t k = 1; k < cuts[0].size(); ++k)
+    most = std::max(most, most_between(cuts[0][k - 1], cuts[0][k], grid.edges[0], sums));
   std::size_t cells = 1;
   for (const std::vector<double>& c : cuts) cells *= c.size() - 1;
   return most * static_cast<double>(cells) / all;

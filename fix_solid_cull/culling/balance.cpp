@@ -20,7 +20,8 @@ constexpr double least_move = 0.01;
 /// Calls visit(place, work) for all granules of this rank.
 template <class Visit>
 void for_each_granule(const Bed& bed, Visit visit) {
-  for (int i = 0; i < bed.atoms.owned; ++i) visit(bed.run.wrapped(bed.atoms.place(i)), bed.shell.locked(i) ? interface_work : 1.0);
+  for (int i = 0; i < bed.atoms.owned; ++i)
+    visit(bed.run.wrapped(bed.atoms.place(i)), bed.shell.locked(i) ? interface_work : 1.0);
   bed.solid.store().for_each([&](const Resident& g) { visit(bed.run.wrapped(bed.solid.in_world(g)), interior_work); });
 }
 
@@ -51,8 +52,10 @@ bool Balance::look(std::int64_t step) {
 std::string Balance::end_run() {
   if (compared_ == 0) return {};
   char text[160];
-  std::snprintf(text, sizeof text, "cuts between ranks moved %d times; %s the most loaded rank had %.2f times the mean work on average, %.2f at most",
-                moves_, moves_ ? "after the first time" : "so far", sum_ / compared_, largest_);
+  std::snprintf(
+      text, sizeof text,
+      "cuts between ranks moved %d times; %s the most loaded rank had %.2f times the mean work on average, %.2f at most", moves_,
+      moves_ ? "after the first time" : "so far", sum_ / compared_, largest_);
   moves_ = compared_ = 0;
   sum_ = largest_ = 0;
   return text;
@@ -101,7 +104,8 @@ bool Balance::move() {
     sum_ = largest_ = 0;
   }
   char text[160];
-  std::snprintf(text, sizeof text, "step %lld: the most loaded rank had %.2f times the mean work; cuts moved by up to %.0f %% of a rank",
+  std::snprintf(text, sizeof text,
+                "step %lld: the most loaded rank had %.2f times the mean work; cuts moved by up to %.0f %% of a rank",
                 static_cast<long long>(bed_.run.deck_step()), imbalance_, 100 * farthest);
   bed_.run.say(text);
   return true;

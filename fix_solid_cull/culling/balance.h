@@ -28,7 +28,7 @@ class Balance {
 
   const Bed& bed_;
   bool due_ = false;
-  double imbalance_ = 0;  // largest work of a rank over the mean, when they were compared last
+  double imbalance_ = 0;          // largest work of a rank over the mean, when they were compared last
   int moves_ = 0, compared_ = 0;  // in this run; compared since the first move, if there was one
   double sum_ = 0, largest_ = 0;  // of those imbalances
 };

@@ -60,7 +60,8 @@ void BodyGroups::group() {
     bed_.solid.contacts().for_each_partner(tag, [&](std::int64_t partner) {
       if (bodies.body_of(partner)) return;
       const Vec3 x = bodies.pose(body).to_world(masses_(tag).position);
-      ends.push_back({triple(bed_.run.wrapped(x)), triple(x), std::min(tag, partner), std::max(tag, partner), bed_.ranks.me, body});
+      ends.push_back(
+          {triple(bed_.run.wrapped(x)), triple(x), std::min(tag, partner), std::max(tag, partner), bed_.ranks.me, body});
     });
   };
   for (int i = 0; i < bed_.atoms.owned; ++i)
@@ -82,9 +83,8 @@ void BodyGroups::group() {
     if (one != own.end() && other.rank != bed_.ranks.me) met.push_back({one->second, other});
   }
   // by contact, so that both ranks take the same one of several to be the first
-  std::sort(met.begin(), met.end(), [](const Met& a, const Met& b) {
-    return std::tie(a.own->low, a.own->high) < std::tie(b.own->low, b.own->high);
-  });
+  std::sort(met.begin(), met.end(),
+            [](const Met& a, const Met& b) { return std::tie(a.own->low, a.own->high) < std::tie(b.own->low, b.own->high); });
   const Vec3 edges = bed_.solid.bodies().periods();
   std::map<int, std::vector<PartLink>> links;
   for (const Met& m : met) {
@@ -147,20 +147,23 @@ void BodyGroups::settle_those_over_ranks(TakesPart takes_part) {
     row.grounded = body->grounded;
     row.held = body->mass.held != 0;
   }
-  trees_.unite(parts, [](Part& whole, const Part& other) {
-    if (other.mass == 0) return;
-    if (whole.mass == 0) {
-      whole = other;
-      return;
-    }
-    RigidSum sum = whole.sum();
-    sum.add(other.sum());
-    whole.set(sum);
-    whole.grounded_mass += other.grounded_mass;
-    for (int d = 0; d < 3; ++d) whole.tied[d] = whole.tied[d] || other.tied[d];
-    whole.grounded = whole.grounded || other.grounded;
-    whole.held = whole.held || other.held;
-  }, takes_part);
+  trees_.unite(
+      parts,
+      [](Part& whole, const Part& other) {
+        if (other.mass == 0) return;
+        if (whole.mass == 0) {
+          whole = other;
+          return;
+        }
+        RigidSum sum = whole.sum();
+        sum.add(other.sum());
+        whole.set(sum);
+        whole.grounded_mass += other.grounded_mass;
+        for (int d = 0; d < 3; ++d) whole.tied[d] = whole.tied[d] || other.tied[d];
+        whole.grounded = whole.grounded || other.grounded;
+        whole.held = whole.held || other.held;
+      },
+      takes_part);
   for (std::size_t p = 0; p < parts.size(); ++p) {
     if (!takes_part(static_cast<int>(p)) || !part(p)) continue;
     const Part& whole = parts[p];

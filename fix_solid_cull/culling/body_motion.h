@@ -39,8 +39,8 @@ class BodyMotion : public BodyFollower {
     stale_ = true;
     tell_next();
   }
-  /// What presses on bodies that stand is summed over their ranks in the next step: all ranks say so alike. Else it is taken to be
-  /// what it was, but for what differs_from_told(). Local.
+  /// What presses on bodies that stand is summed over their ranks in the next step: all ranks say so alike. Else it is taken to
+  /// be what it was, but for what differs_from_told(). Local.
   void tell_next() { tells_ = true; }
   /// In this step, on this rank: by more than a hundredth of a granule's weight. Local.
   bool differs_from_told() const { return differs_; }

@@ -183,9 +183,10 @@ void Change::pack(bool& shell_changed) {
 /// And what nothing is near goes in.
 void Change::store_and_fetch(const MembershipChange& c, const Occasion& now, bool changes, bool& shell_changed) {
   if (changes || (bed_.scales.sleeping() && bed_.census.something_locked()))
-    shell_changed |= p_.deep.store({c.locked_some(), now.asks_to_store, changes, now.highest}, [&](const std::vector<int>& atoms, const DeepGranules::Near& near) {
-      return p_.refill.acts() ? p_.refill.put_away(atoms, near) : p_.exchange.put_away(atoms);
-    }) > 0;
+    shell_changed |= p_.deep.store({c.locked_some(), now.asks_to_store, changes, now.highest},
+                                   [&](const std::vector<int>& atoms, const DeepGranules::Near& near) {
+                                     return p_.refill.acts() ? p_.refill.put_away(atoms, near) : p_.exchange.put_away(atoms);
+                                   }) > 0;
   if (bed_.census.something_stored()) shell_changed |= p_.closure.fetch_from_outside() > 0;
 }
 

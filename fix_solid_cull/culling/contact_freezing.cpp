@@ -82,7 +82,9 @@ void ContactFreezing::freeze_between_merged() {
       const int* j = bed_.index.find(partner);
       if (j && just_locked(i) && just_locked(*j)) return;  // freeze() has seen to it
       const BodyGroups::Key* ghost = j ? nullptr : bed_.groups.ghost(partner);
-      const BodyGroups::Key other = j ? (bed_.shell[*j].locked ? bed_.groups.key_of(bed_.shell[*j].body) : 0) : ghost ? *ghost : 0;
+      const BodyGroups::Key other = j       ? (bed_.shell[*j].locked ? bed_.groups.key_of(bed_.shell[*j].body) : 0)
+                                    : ghost ? *ghost
+                                            : 0;
       if (other != own || bed_.solid.contacts().contains(tag, partner)) return;
       bed_.solid.freeze(tag, partner, history);
       if (!j) return;

@@ -170,8 +170,7 @@ void Culling::take_neighbours() {
   else
     bed_.groups.forget_ghosts();
   // the box followed the granules: stored ones go to the rank that has their place now, before anything comes near them
-  if (bed_.census.something_stored() && bed_.ranks.subdomains_changed())
-    bed_.run.ask_for_reneighbouring(bed_.run.step + 1);
+  if (bed_.census.something_stored() && bed_.ranks.subdomains_changed()) bed_.run.ask_for_reneighbouring(bed_.run.step + 1);
   if (Invariants::asked()) p_.invariants.check();
 }
 
@@ -227,7 +226,7 @@ void Culling::collect_wakes() {
   if (has_collected_) builds = ask_for_those_that_wake() || p_.motion.comes_too_far(p_.pacing.wake_period() + 1) || builds;
   if (bed_.ranks.count > 1) {
     bed_.ranks.begin_any((blow ? blow_bit : 0) | (builds || p_.motion.comes_too_far(1) ? build_bit : 0) |
-                          (p_.motion.differs_from_told() ? load_bit : 0));
+                         (p_.motion.differs_from_told() ? load_bit : 0));
     asked_others_ = true;
   } else if (builds) {
     p_.ask_for_build(step + 1);

@@ -50,7 +50,7 @@ class Handover : public BodyFollower {
   Parcels& parcels_;
   std::vector<LostGranule> before_;      // interface granules of this rank when the engine was last given its atoms
   std::vector<LostGranule> on_the_way_;  // announced by another rank, and lost
-  std::map<int, Leaving> leaving_;           // by the rank where they go
+  std::map<int, Leaving> leaving_;       // by the rank where they go
   std::map<int, Pose> at_home_;          // frames of the store when their granules were last compared with the subdomain
 };
 

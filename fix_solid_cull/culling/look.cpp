@@ -79,8 +79,7 @@ Proposal Look::survey(bool may_cull, bool any_culled) {
 bool Look::are_worth_choosing(std::int64_t candidates) const {
   std::int64_t all[2] = {candidates, bed_.atoms.owned};
   bed_.ranks.sum(all, 2);
-  const double few =
-      (bed_.scales.needs_surface() ? Pacing::worth_share : Pacing::worth_watching) * static_cast<double>(all[1]);
+  const double few = (bed_.scales.needs_surface() ? Pacing::worth_share : Pacing::worth_watching) * static_cast<double>(all[1]);
   return all[0] > 0 && static_cast<double>(all[0]) >= few;
 }
 
@@ -120,10 +119,9 @@ bool Look::judge(bool may_cull) {
     p_.pacing.forget_work();
     return all[wakes] != 0;
   }
-  const Pacing::Verdict verdict =
-      p_.pacing.judge({all[interface_granules], all[interior_granules], all[atoms], all[restored_anywhere], all[chosen],
-                       all[exterior], surface_drawn_},
-                      step);
+  const Pacing::Verdict verdict = p_.pacing.judge({all[interface_granules], all[interior_granules], all[atoms],
+                                                   all[restored_anywhere], all[chosen], all[exterior], surface_drawn_},
+                                                  step);
   if (verdict.wait == 0) return all[wakes] != 0;
   p_.pacing.see_wait(verdict.wait, p_.survey.kinetic_energy_of_exterior(), step);
   if (verdict.give_back) {

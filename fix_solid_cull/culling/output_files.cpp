@@ -65,7 +65,7 @@ const std::map<int, InterfaceMesh>& OutputFiles::ask_meshes() {
 /// Each body's mesh on rank 0, by key, where the meshes of this rank are `here`: each rank sends its parts, and those of one body
 /// are united in `parts`. Nothing elsewhere.
 std::map<BodyGroups::Key, const InterfaceMesh*> OutputFiles::whole_meshes(const std::map<int, InterfaceMesh>& here,
-                                                              std::map<BodyGroups::Key, InterfaceMesh>& parts) {
+                                                                          std::map<BodyGroups::Key, InterfaceMesh>& parts) {
   const auto timed = report_.time(Part::mesh);
   struct Head {
     BodyGroups::Key key;

@@ -27,7 +27,8 @@ class OutputFiles {
  private:
   void write_meshes(const std::string& file);
   void write_bed(const std::string& file);
-  std::map<BodyGroups::Key, const InterfaceMesh*> whole_meshes(const std::map<int, InterfaceMesh>& here, std::map<BodyGroups::Key, InterfaceMesh>& parts);
+  std::map<BodyGroups::Key, const InterfaceMesh*> whole_meshes(const std::map<int, InterfaceMesh>& here,
+                                                               std::map<BodyGroups::Key, InterfaceMesh>& parts);
   std::string file_of_step(const std::string& pattern) const;
   template <class Write>
   void on_root(const char* keyword, Write write);

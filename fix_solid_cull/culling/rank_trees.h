@@ -16,9 +16,9 @@ namespace solidcull {
 
 /// A part of another rank that a part of this one is tied to.
 struct PartLink {
-  int rank, body;                           ///< its number there
-  Vec3 to_other;                            ///< brings this part's periodic image to that one's (m)
-  std::array<bool, 3> tied_anew{};          ///< a further contact between the two brings it to another image in these directions
+  int rank, body;                   ///< its number there
+  Vec3 to_other;                    ///< brings this part's periodic image to that one's (m)
+  std::array<bool, 3> tied_anew{};  ///< a further contact between the two brings it to another image in these directions
 };
 
 class RankTrees {
@@ -92,10 +92,11 @@ class RankTrees {
 
   const Ranks& ranks_;
   std::vector<Part> parts_;
-  std::vector<Branch> branches_;         // of parts_
-  std::vector<std::size_t> downwards_;   // parts_ in the order in which sums come back
+  std::vector<Branch> branches_;        // of parts_
+  std::vector<std::size_t> downwards_;  // parts_ in the order in which sums come back
   std::map<int, int> place_;
-  mutable std::map<std::array<int, 3>, std::vector<char>> early_;  // rows that came before they were asked for: from rank, to, from
+  mutable std::map<std::array<int, 3>, std::vector<char>>
+      early_;  // rows that came before they were asked for: from rank, to, from
 };
 
 }  // namespace solidcull

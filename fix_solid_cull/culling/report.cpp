@@ -53,8 +53,7 @@ void Report::count_totals() {
   bed_.ranks.sum(sums, 15);
   double largest[2] = {motion_.largest_excess(), watch_.total()};
   bed_.ranks.largest(largest, 2);
-  totals_ = {sums[0],    sums[1],    sums[2], sums[3], sums[4], sums[5], sums[6], sums[14],
-             largest[0], largest[1], sums[7], sums[8]};
+  totals_ = {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[14], largest[0], largest[1], sums[7], sums[8]};
   rests_again_ = {sums[9], sums[10]};
   spent_ = {sums[11], sums[12], sums[13]};
 }

@@ -34,7 +34,7 @@ class ShellClosure : public BodyFollower {
   struct Foreign {
     Sphere sphere;
     BodyGroups::Key body;  // 0: exterior
-    bool stands;  // the body does, and what is stored of it
+    bool stands;           // the body does, and what is stored of it
   };
 
   ShellClosure(Bed& bed, StoreExchange& exchange) : bed_(bed), exchange_(exchange) {}

@@ -5,7 +5,8 @@
 
 namespace solidcull {
 
-/// Largest distance (m) at which two granules, atoms or stored, may be neighbours: two largest radii and the skin. Local, alike on all ranks.
+/// Largest distance (m) at which two granules, atoms or stored, may be neighbours: two largest radii and the skin. Local, alike
+/// on all ranks.
 inline double contact_reach(const BedState& bed) { return 2 * bed.largest_radius + bed.run.skin; }
 /// Of what is on this rank (m). Local.
 double largest_radius_here(const BedState& bed);

@@ -29,7 +29,7 @@ struct Settings {
   double carve_cap = 4.0;         ///< largest growth of r0
   Store store = Store::exact;
   Restore restore = Restore::exact;
-  double voxel = 0.5;  ///< in mean diameters
+  double voxel = 0.5;            ///< in mean diameters
   int balance_every = 0;         ///< steps between two looks at the work of ranks; 0: cuts between them stay
   double balance_threshold = 0;  ///< largest work of a rank over the mean from which cuts move
   ReportLength report = ReportLength::brief;

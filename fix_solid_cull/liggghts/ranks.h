@@ -67,7 +67,7 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
   const std::vector<Partner>& partners(double reach) const;
   void forget_sent() const;
 
-  RankGrid grid_;  // as it was at the last update()
+  RankGrid grid_;                               // as it was at the last update()
   Vec3 lo_ = Vec3::Zero(), hi_ = Vec3::Zero();  // this rank's cell of it
   bool far_out_ = true;
   std::vector<Vec3> shifts_{Vec3::Zero()};

@@ -12,7 +12,9 @@ namespace decks {
 namespace {
 
 /// A bed at rest in one half of a box that is twice as long: ranks of the other half have nothing to do.
-std::string half_empty(const Bed& bed) { return read_bed(bed) + "run 0\nchange_box all x final 0 " + std::to_string(2 * bed.side) + "\n"; }
+std::string half_empty(const Bed& bed) {
+  return read_bed(bed) + "run 0\nchange_box all x final 0 " + std::to_string(2 * bed.side) + "\n";
+}
 
 Bed bed_with(bool mesh_walls) {
   Bed bed;
@@ -80,9 +82,8 @@ TEST_P(Balance, FollowsABlow) {
   EXPECT_NEAR(b.at(1301).x[2], a.at(1301).x[2], 5e-4) << "how deep it went";
 }
 
-INSTANTIATE_TEST_SUITE_P(Walls, Balance, testing::Bool(), [](const testing::TestParamInfo<bool>& p) {
-  return std::string(p.param ? "mesh" : "planes");
-});
+INSTANTIATE_TEST_SUITE_P(Walls, Balance, testing::Bool(),
+                         [](const testing::TestParamInfo<bool>& p) { return std::string(p.param ? "mesh" : "planes"); });
 
 }  // namespace
 }  // namespace decks

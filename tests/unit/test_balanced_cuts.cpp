@@ -63,9 +63,8 @@ TEST(BalancedCuts, along_one_axis_all_ranks_get_the_same) {
 }
 
 TEST(BalancedCuts, a_blow_in_a_corner_is_shared_by_eight_ranks) {
-  const WorkGrid grid = grid_of(16, [](double x, double y, double z) {
-    return std::hypot(x - 0.2, y - 0.2, z - 0.9) < 0.5 ? 1.0 : 0.02;
-  });
+  const WorkGrid grid =
+      grid_of(16, [](double x, double y, double z) { return std::hypot(x - 0.2, y - 0.2, z - 0.9) < 0.5 ? 1.0 : 0.02; });
   const Cuts cuts = even_cuts(2, 2, 2);
   EXPECT_GT(imbalance(cuts, grid), 2);
   EXPECT_LT(imbalance(settled(cuts, grid, 0.05), grid), 1.1);

@@ -81,7 +81,9 @@ class Crowd {
     void exchange_bytes(const void*, std::size_t, std::size_t, double, const Room&) const override {
       throw InternalError("exchange");
     }
-    void deliver_bytes(const std::vector<Letter>&, std::size_t, const RoomFrom&) const override { throw InternalError("deliver"); }
+    void deliver_bytes(const std::vector<Letter>&, std::size_t, const RoomFrom&) const override {
+      throw InternalError("deliver");
+    }
     void gather_bytes(const void*, std::size_t, std::size_t, bool, const Room&) const override { throw InternalError("gather"); }
 
    private:

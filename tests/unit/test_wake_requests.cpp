@@ -20,9 +20,7 @@ SmallDeck box(std::array<int, 3> split) {
 
 constexpr double margin = 3 * d;
 
-Wakes take(WakeRequests& wake, const SmallWorld& w) {
-  return wake.take(w.ranks, law, w.ranks.any(wake.asks_all()), margin);
-}
+Wakes take(WakeRequests& wake, const SmallWorld& w) { return wake.take(w.ranks, law, w.ranks.any(wake.asks_all()), margin); }
 
 TEST(WakeRequests, every_rank_gets_the_balls_that_reach_what_it_may_hold) {
   run_on_ranks(box({3, 1, 1}), [](SmallWorld& w) {
