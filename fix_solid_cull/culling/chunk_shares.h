@@ -47,7 +47,7 @@ class ChunkShares {
   void share_granule(const std::uint64_t* row, std::size_t columns, int rank, WordTable& to);
   void share_contacts();
   std::uint64_t body_number(int rank, std::uint64_t body);
-  Loose loose(const std::uint64_t* contact) const;
+  Loose loose(const std::uint64_t* row) const;
 
   const Bed& bed_;
   ChunkReader reader_;
