@@ -85,7 +85,7 @@ class ChunkReader {
   const Head& part(const SectionChunk& chunk);
   const Head& part(const PartTables& tables, std::uint64_t rank);
   /// Behind those that are known.
-  void more_bodies(const WordTable& bodies);
+  void more_bodies(const WordTable& table);
   /// Valid until the next chunk is read.
   const Parcel& parcel(const SectionChunk& chunk);
   const Parcel& parcel(const ChunkTables& tables);

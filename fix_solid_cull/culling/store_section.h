@@ -140,7 +140,7 @@ class SectionReader {
   std::vector<Dealt> dealt();
 
  private:
-  std::string open(std::uint64_t identity, std::vector<std::uint64_t>& table);
+  std::string open(std::uint64_t identity, std::vector<std::uint64_t>& words);
   bool fetch(std::uint64_t at, void* to, std::size_t n);
 
   const Ranks& ranks_;

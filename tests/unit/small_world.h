@@ -128,7 +128,7 @@ class SmallAtoms : public Atoms {
   void count_more(std::int64_t returned) override;
   void sort_soon() override { sort_asked = true; }
 
-  int find(int tag) const;  ///< owned; -1: none
+  int find(int wanted) const;  ///< owned; -1: none
   int append();             ///< a new owned atom, all zero
   void drop_ghosts() override { ghosts = 0; }
   int append_ghost();
@@ -299,7 +299,7 @@ class SmallRun : public Run {
   explicit SmallRun(SmallWorld& world) : world_(world) {}
   Vec3 gravity() const override;
   Vec3 wrapped(const Vec3& place) const override;
-  bool ask_for_reneighbouring(std::int64_t step) override;
+  bool ask_for_reneighbouring(std::int64_t at) override;
   double seconds_of_pair_forces() const override { return pair_forces; }
   void say(const std::string& line) const override;
 
@@ -332,7 +332,7 @@ class SmallMemory : public Memory {
 
 class SmallWorld {
  public:
-  explicit SmallWorld(const SmallDeck& deck, Meeting* meeting = nullptr, int rank = 0, int ranks = 1);
+  explicit SmallWorld(const SmallDeck& its_deck, Meeting* meeting = nullptr, int rank = 0, int rank_count = 1);
   SmallWorld(const SmallWorld&) = delete;
 
   SmallDeck deck;
