@@ -129,7 +129,7 @@ class SmallAtoms : public Atoms {
   void sort_soon() override { sort_asked = true; }
 
   int find(int wanted) const;  ///< owned; -1: none
-  int append();             ///< a new owned atom, all zero
+  int append();                ///< a new owned atom, all zero
   void drop_ghosts() override { ghosts = 0; }
   int append_ghost();
   void swap(int i, int j);  ///< owned ones; followers follow
