@@ -11,7 +11,7 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))
-from solidcull_runs import cutaways, engine, errors, examples, kills, plots  # noqa: E402
+from solidcull_runs import engine, errors, examples, kills, struck  # noqa: E402
 from solidcull_runs.dumps import read_final  # noqa: E402
 
 LENGTH, WIDTH, DEPTH, STRIKER = 0.15, 0.075, 0.062, 0.005  # m: of the bed, height shown, larger radii are the ball
@@ -21,30 +21,6 @@ METRICS = ("c_ballz", "c_ballz:min", "v_force:max", "c_bedke:mean", "v_floor:max
 RANKS = 2
 SHOWN = 4                                  # moments in the picture
 PATIENCE = 3600                            # s for a job
-
-
-def milliseconds(step):
-    return step * TIME_STEP * 1e3
-
-
-def plot(runs, file):
-    figure, (top, bottom) = plots.rows(2, (7, 6))
-    for style, run in plots.of_both(runs):
-        step, height = run.series("c_ballz")
-        top.plot(milliseconds(step), height * 1e3, **style)
-    top.set_ylabel("height of the ball's centre (mm)")
-    top.legend()
-    plots.exterior(bottom, runs["culled"], milliseconds)
-    bottom.axhline(len(runs["unculled"][0].final), color="0.75", lw=4)
-    bottom.set(xlabel="time (ms)", ylabel="exterior granules", ylim=(0, None))
-    plots.save(figure, file)
-
-
-def moments(out, steps, runs):
-    steps = steps[1:]  # before the first one nothing has been struck
-    for step in sorted({steps[round(k) - 1] for k in np.geomspace(1, len(steps), SHOWN)}):
-        yield (f"{milliseconds(step):.0f} ms",
-               *cutaways.cut_away_files(out, step, WIDTH / 2, (0, 0, 0), (LENGTH, WIDTH, DEPTH), striker_radius=STRIKER))
 
 
 # --- the job, killed and started again ------------------------------------------------------------------------------
@@ -104,7 +80,8 @@ def killed_and_resumed(example, variables, runs, few):
 
 CLUSTER = examples.Example(
     here=HERE, deck="strike.in", bed="settle.in", bed_takes="settling 40,000 granules: two to three minutes",
-    sources=("bed.in", "floor.stl"), granules=40001, steps=8000, wanted=METRICS, figures=lambda run, out: {}, plot=plot, moments=moments,
+    sources=("bed.in", "floor.stl"), granules=40001, steps=8000, wanted=METRICS, figures=lambda run, out: {},
+    plot=struck.plot_of(TIME_STEP), moments=struck.moments_of(TIME_STEP, SHOWN, WIDTH / 2, (LENGTH, WIDTH, DEPTH), STRIKER),
     ranks=RANKS, after=killed_and_resumed, files_every=400, vary=("dx", APART), runs=1,
     few={"L": 0.1, "W": 0.02, "bed_granules": 1800, "steps": 700, "every": 200, "drop": 0.024},
     few_bed={"L": 0.1, "W": 0.02, "bed_granules": 1800, "dampsteps": 1000, "freesteps": 50},

@@ -3,11 +3,9 @@ the table, a plot and pictures in out/."""
 import sys
 from pathlib import Path
 
-import numpy as np
-
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))
-from solidcull_runs import cutaways, errors, examples, plots  # noqa: E402
+from solidcull_runs import errors, examples, struck  # noqa: E402
 from solidcull_runs.dumps import read_final  # noqa: E402
 from solidcull_runs.measures import height_map  # noqa: E402
 
@@ -31,33 +29,10 @@ def crater(run, out):
             "heap volume": float(change[change > 0].sum() * CELL**2)}
 
 
-def milliseconds(step):
-    return step * TIME_STEP * 1e3
-
-
-def plot(runs, file):
-    figure, (top, bottom) = plots.rows(2, (7, 6))
-    for style, run in plots.of_both(runs):
-        step, height = run.series("c_ballz")
-        top.plot(milliseconds(step), height * 1e3, **style)
-    top.set_ylabel("height of the ball's centre (mm)")
-    top.legend()
-    plots.exterior(bottom, runs["culled"], milliseconds)
-    bottom.axhline(len(runs["unculled"][0].final), color="0.75", lw=4)
-    bottom.set(xlabel="time (ms)", ylabel="exterior granules", ylim=(0, None))
-    plots.save(figure, file)
-
-
-def moments(out, steps, runs):
-    steps = steps[1:]  # before the first one nothing has been struck
-    for step in sorted({steps[round(k) - 1] for k in np.geomspace(1, len(steps), SHOWN)}):
-        yield (f"{milliseconds(step):.0f} ms",
-               *cutaways.cut_away_files(out, step, BOX / 2, (0, 0, 0), (BOX, BOX, DEPTH), striker_radius=STRIKER))
-
-
 IMPACT = examples.Example(
     here=HERE, deck="impact.in", bed="settle.in", bed_takes="settling 20,000 granules: one to two minutes",
-    sources=("bed.in", "floor.stl"), granules=20001, steps=8000, wanted=METRICS, figures=crater, plot=plot, moments=moments,
+    sources=("bed.in", "floor.stl"), granules=20001, steps=8000, wanted=METRICS, figures=crater,
+    plot=struck.plot_of(TIME_STEP), moments=struck.moments_of(TIME_STEP, SHOWN, BOX / 2, (BOX, BOX, DEPTH), STRIKER),
     files_every=400, vdb_every=4000, vary=("dx", APART), runs=5, at_once=2,
     few={"L": 0.02, "bed_granules": 900, "steps": 700}, few_bed={"L": 0.02, "bed_granules": 900, "dampsteps": 1000, "freesteps": 50},
     few_granules=901, few_steps=700, few_files_every=100, few_keywords="every 20")

@@ -50,6 +50,7 @@ bool Balance::look(std::int64_t step) {
 }
 
 std::string Balance::end_run() {
+  due_ = false;  // a deck may send granules anywhere before the next run; cuts move by one neighbour
   if (compared_ == 0) return {};
   char text[160];
   std::snprintf(
