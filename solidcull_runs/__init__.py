@@ -18,6 +18,7 @@ line and compared.
 | `tables` | comparisons as text |
 | `plots` | curves of runs of both kinds |
 | `cutaways` | pictures of a bed and its interface mesh, cut open |
+| `struck` | what is drawn of a bed that a ball strikes |
 | `kills` | a job on several ranks that is killed, and the newest restart file that it left |
 | `examples` | the course that all examples take |
 
