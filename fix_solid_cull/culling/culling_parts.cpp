@@ -31,7 +31,7 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       files(bed, meshes, report),
       invariants(bed),
       followers{&bed.shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown} {
-  for (BodyFollower* f : std::initializer_list<BodyFollower*>{&motion, &grounding, &closure, &handover, &cover, &meshes})
+  for (BodyFollower* f : std::initializer_list<BodyFollower*>{&motion, &closure, &handover, &cover, &meshes})
     bed.solid.followed_by(*f);
   for (StoreFollower* f : std::initializer_list<StoreFollower*>{&walls, &grounding, &cover, &refill}) exchange.followed_by(*f);
 }

@@ -42,20 +42,6 @@ std::vector<WallLoad> Grounding::wall_loads_on(int i) const {
 
 // ------------------------------------------------------------------------------------------------------------ bodies
 
-void Grounding::merged(int gone, int kept, bool) {
-  if (const Sum* sum = mean_extra_load_.find(gone)) {
-    const Vec3 moved = sum->value;
-    mean_extra_load_[kept].value += moved;
-    mean_extra_load_.erase(gone);
-  }
-  looks_at_rest_.erase(gone);
-}
-
-void Grounding::forgotten(int body) {
-  looks_at_rest_.erase(body);
-  mean_extra_load_.erase(body);
-}
-
 void Grounding::let_go() {
   for (const int body : to_let_go_)
     if (bed_.solid.exists(body)) bed_.solid.ground(body, false);
@@ -75,15 +61,14 @@ std::vector<char> Grounding::held_over_ranks() const {
   return held;
 }
 
-bool Grounding::may_be_let_go(int number, const SolidBody& body, bool held) const {
+bool Grounding::may_be_let_go(const SolidBody& body, bool held) const {
   if (body.grounded_mass < grounded_share * body.mass.mass) return true;
-  const Sum* mean = mean_extra_load_.find(number);
-  if (!mean) return !held;
+  if (!body.pressed) return !held;
   const Vec3 g = bed_.run.gravity();
   const Vec3 down = g.norm() > 0 ? Vec3(g.normalized()) : Vec3(Vec3::Zero());
-  const double weight = body.motion.mass() * bed_.scales.gravity(), along = mean->value.dot(down);
+  const double weight = body.motion.mass() * bed_.scales.gravity(), along = body.extra_load.dot(down);
   const bool holds =
-      -along < against_share * weight && (mean->value - along * down).norm() < along_share * (weight + std::max(0.0, along));
+      -along < against_share * weight && (body.extra_load - along * down).norm() < along_share * (weight + std::max(0.0, along));
   return !held || !holds;
 }
 
@@ -110,16 +95,16 @@ std::vector<char> Grounding::update() {
     const int over_ranks = bed_.groups.spanning(number);
     const bool held = over_ranks < 0 ? body.mass.held > 0 : held_over_all[static_cast<std::size_t>(over_ranks)] != 0;
     if (body.grounded) {
-      if (may_be_let_go(number, body, held)) to_let_go_.insert(number);
+      if (may_be_let_go(body, held)) to_let_go_.insert(number);
       continue;
     }
     const ActiveBody* const* of = loads.find(number);
     const int* one = only_atom.find(number);
     if (!held || !of || !is_at_rest(body, **of, one)) {
-      looks_at_rest_.erase(number);
+      body.looks_at_rest = 0;
       continue;
     }
-    if (++looks_at_rest_[number] < looks_to_ground) continue;
+    if (++body.looks_at_rest < looks_to_ground) continue;
     if (over_ranks >= 0) {
       grounds[static_cast<std::size_t>(over_ranks)] = 1;
       continue;
@@ -143,9 +128,8 @@ void Grounding::share_out_loads() {
   std::vector<double> weights(bed_.groups.spanning_parts(), 0.0);
   std::vector<std::pair<const ActiveBody*, double>> sums;
   for (const ActiveBody& a : motion_.active()) {
-    const Sum* mean = a.stands ? mean_extra_load_.find(a.number) : nullptr;
-    if (!mean) continue;
-    sums.emplace_back(&a, bed_.solid.weigh_wall_loads(a.number, mean->value));
+    if (!a.stands || !a.body->pressed) continue;
+    sums.emplace_back(&a, bed_.solid.weigh_wall_loads(a.number, a.body->extra_load));
     if (a.spanning >= 0) weights[static_cast<std::size_t>(a.spanning)] += sums.back().second;
   }
   bed_.groups.unite(weights, [](double& whole, double other) { whole += other; });
@@ -161,8 +145,8 @@ void Grounding::press_on_walls() {
   // a body that stands still in spite of a load hands it on to the walls that hold it
   for (const ActiveBody& a : motion_.active()) {
     if (!a.stands) continue;
-    Vec3& mean = mean_extra_load_[a.number].value;
-    mean += (a.change - mean) / bed_.scales.look_every();
+    a.body->pressed = true;
+    a.body->extra_load += (a.change - a.body->extra_load) / bed_.scales.look_every();
     if (a.change.isZero(0)) continue;
     for (const auto& [place, e] : bed_.solid.wall_loads().of(a.number)) {
       if (!(e.share > 0)) continue;

@@ -7,14 +7,13 @@
 
 #include "bed.h"
 #include "body_motion.h"
-#include "flat_map.h"
 #include "store_exchange.h"
 #include "wall_survey.h"
 
 namespace solidcull {
 
 /// Which bodies stand on walls, for how long, and what they hand on to them.
-class Grounding : public BodyFollower, public StoreFollower {
+class Grounding : public StoreFollower {
  public:
   Grounding(Bed& bed, const BodyMotion& motion, const WallSurvey& walls) : bed_(bed), motion_(motion), walls_(walls) {}
 
@@ -33,24 +32,16 @@ class Grounding : public BodyFollower, public StoreFollower {
   /// Local.
   std::vector<WallLoad> wall_loads_on(int i) const;
   void goes(int i, int& walls, std::vector<WallLoad>& loads) override;
-  void merged(int gone, int kept, bool same_frame) override;
-  void grounded_or_let_go(int body) override { forgotten(body); }
-  void forgotten(int body) override;
 
  private:
-  struct Sum {
-    Vec3 value = Vec3::Zero();
-  };
   std::vector<char> held_over_ranks() const;
-  bool may_be_let_go(int number, const SolidBody& body, bool held) const;
+  bool may_be_let_go(const SolidBody& body, bool held) const;
   bool is_at_rest(const SolidBody& body, const ActiveBody& loads, const int* only_atom) const;
 
   Bed& bed_;
   const BodyMotion& motion_;
   const WallSurvey& walls_;
-  FlatMap<int> looks_at_rest_;    // body -> looks in a row at which it was at rest at a wall that stands still
-  FlatMap<Sum> mean_extra_load_;  // grounded body -> running mean of what its walls bear beyond what is frozen (N)
-  std::set<int> to_let_go_;       // grounded bodies that the walls might not hold any more
+  std::set<int> to_let_go_;  // grounded bodies that the walls might not hold any more
 };
 
 }  // namespace solidcull

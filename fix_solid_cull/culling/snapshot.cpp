@@ -13,7 +13,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261202;  // the format's version
+constexpr double file_mark = 20261203;  // the format's version
 /// The numbers in the file's head. The largest stored radius of each type and a check sum follow them.
 enum Header {
   mark,

@@ -60,10 +60,17 @@ FreeAxes SolidBody::free_axes(const std::array<bool, 3>& spans) {
 void SolidBody::ground(bool on) {
   grounded = on;
   grounded_mass = on ? mass.mass : 0.0;
+  begin_to_rest();
   changed = true;
   step_then = -1;
   acceleration = Vec3::Zero();
   twist = {pose.to_world(mass.centre()), Vec3::Zero(), is_one_granule() ? twist.spin : Vec3(Vec3::Zero())};
+}
+
+void SolidBody::begin_to_rest() {
+  looks_at_rest = 0;
+  pressed = false;
+  extra_load = Vec3::Zero();
 }
 
 void SolidBody::reframe_one(const GranuleMass& in_world) {
@@ -179,6 +186,8 @@ int SolidBodies::merge(int a, int b, Vec3 shift) {
   for (int d = 0; d < 3; ++d) kept.spans[d] = kept.spans[d] || gone.spans[d];
   kept.grounded = kept.grounded || gone.grounded;
   kept.grounded_mass += gone.grounded_mass;
+  kept.pressed = kept.pressed || gone.pressed;
+  kept.extra_load += gone.extra_load;
   add(kept, gone.part());
   if (kept.felt_known && gone.felt_known) {
     const double share = gone.mass.mass / (kept.mass.mass + gone.mass.mass);
@@ -316,6 +325,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       SolidBody& rest = this->body(body);
       off = rest;  // same frame, same velocity field, same load at locking
       off.mass = MassProperties();
+      off.begin_to_rest();
       off.step_then = rest.step_then = -1;
       off.changed = rest.changed = true;
       off.spans = {};

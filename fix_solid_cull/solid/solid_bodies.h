@@ -70,6 +70,11 @@ struct SolidBody {
   /// grounded one those are that hold a granule that is held.
   bool grounded = false;
   double grounded_mass = 0;  ///< of what was grounded of itself, not by merging with what was (kg)
+  /// Since it was grounded or let go the last time: looks in a row at rest at a wall that stands still; the running mean of what
+  /// its walls bear beyond what is frozen, once it was pressed on (N).
+  std::int64_t looks_at_rest = 0;
+  bool pressed = false;
+  Vec3 extra_load = Vec3::Zero();
 
   /// Calls visit(number) with a reference to each number of the state, in one order: to write it to a file and to read it back.
   template <class Visit>
@@ -104,6 +109,9 @@ struct SolidBody {
     vector(acceleration);
     visit(grounded);
     visit(grounded_mass);
+    visit(looks_at_rest);
+    visit(pressed);
+    vector(extra_load);
   }
 
   bool is_one_granule() const { return mass.count == 1 && !spanned; }
@@ -113,6 +121,7 @@ struct SolidBody {
 
   /// Walls hold it from now on, or do no longer. It stands still; a sphere may go on spinning on the spot.
   void ground(bool on);
+  void begin_to_rest();  ///< what is counted and summed since it was grounded or let go
   /// A body of one granule, which stands at this place of the world: its frame becomes the world's.
   void reframe_one(const GranuleMass& in_world);
 

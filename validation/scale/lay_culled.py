@@ -34,7 +34,7 @@ LOW, HIGH, C_BODY, KNOWN, HISTORY = range(5)
 VECTOR_WIDTH = 3
 # numbers of a body, in the order of SolidBody::each_number()
 ORIGIN, QUATERNION, COUNT, B_HELD, ABOUT, B_MASS, FIRST, SECOND, SPIN, TWIST = 0, 3, 7, 8, 9, 12, 13, 16, 25, 26
-FROM_END = 19
+FROM_END = 24
 CHANGED, SPANNED, SUMMED, FELT, FELT_KNOWN, STEP_THEN, GROUNDED, GROUNDED_MASS = 0, 1, 5, 6, 9, 13, 17, 18
 MAIN = 0                                            # the body that holds nearly all, in what is written
 FORWARD = ((0, 1), (1, -1), (1, 0), (1, 1))         # from a tile to those that come after it
