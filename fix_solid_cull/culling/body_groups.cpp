@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -101,7 +102,32 @@ void BodyGroups::group() {
     for (int d = 0; d < 3; ++d)
       known->tied_anew[d] = known->tied_anew[d] || std::abs(to_other[d] - known->to_other[d]) > 0.5 * edges[d];
   }
+  tell_links(links, bed_.ranks.neighbours(reach));
   trees_.grow(links, edges);
+}
+
+/// What goes to another site may be farther from what it touched than any contact reaches. So a rank may see the other's end of a
+/// contact while its own is out of the other's sight: what one of the two ranks knows both know then.
+void BodyGroups::tell_links(std::map<int, std::vector<PartLink>>& links, const std::vector<int>& ranks) const {
+  struct Row {
+    int from, to;  // bodies, by their numbers on the ranks that send and receive
+    Triple to_other;
+    std::array<bool, 3> tied_anew;
+  };
+  std::map<int, std::vector<Row>> out;  // by rank
+  for (const auto& [body, of_body] : links)
+    for (const PartLink& l : of_body) out[l.rank].push_back({body, l.body, triple(l.to_other), l.tied_anew});
+  for (const int rank : ranks) bed_.ranks.send(rank, out[rank].data(), out[rank].size() * sizeof(Row));
+  for (const int rank : ranks) {
+    const std::vector<char> bytes = bed_.ranks.receive(rank);
+    std::vector<Row> rows(bytes.size() / sizeof(Row));
+    if (!rows.empty()) std::memcpy(rows.data(), bytes.data(), bytes.size());
+    for (const Row& r : rows) {
+      std::vector<PartLink>& of_body = links[r.to];
+      if (std::none_of(of_body.begin(), of_body.end(), [&](const PartLink& l) { return l.rank == rank && l.body == r.from; }))
+        of_body.push_back({rank, r.from, -vec(r.to_other), r.tied_anew});
+    }
+  }
 }
 
 void BodyGroups::settle_those_here() {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include "flat_map.h"
@@ -64,6 +65,7 @@ class BodyGroups {
 
  private:
   std::vector<std::int64_t> stored_at_borders() const;
+  void tell_links(std::map<int, std::vector<PartLink>>& links, const std::vector<int>& ranks) const;
   template <class TakesPart>
   void settle_those_over_ranks(TakesPart takes_part);
 

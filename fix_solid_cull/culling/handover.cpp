@@ -32,7 +32,7 @@ bool Handover::find_leaving() {
   bed_.arrivals.clear();
   leaving_.clear();
   if (bed_.ranks.count == 1) return false;
-  const std::vector<int> neighbours = bed_.ranks.neighbours();
+  const std::vector<int> neighbours = bed_.ranks.neighbours(0);
   const auto goes_to = [&](const Vec3& place) -> Leaving* {
     const int owner = bed_.ranks.owner(place);
     if (owner == bed_.ranks.me || !std::binary_search(neighbours.begin(), neighbours.end(), owner)) return nullptr;
@@ -71,7 +71,7 @@ void Handover::leave() {
 }
 
 void Handover::send_home() {
-  const std::vector<int> neighbours = bed_.ranks.neighbours();
+  const std::vector<int> neighbours = bed_.ranks.neighbours(0);
   for (const int rank : neighbours) {
     const auto to = leaving_.find(rank);
     std::vector<double> numbers;

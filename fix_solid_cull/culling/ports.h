@@ -286,8 +286,9 @@ class Ranks {
   virtual bool is_far_out(const Vec3& place) const = 0;
   /// Rows that ranks exchange may be so from here on, and all ranks are neighbours; all ranks say so alike. Local.
   virtual void expect_far_out(bool on) = 0;
-  /// Ranks that may own what has left this rank's subdomain, ascending; each of them has this one among its own. Local.
-  virtual std::vector<int> neighbours() const = 0;
+  /// Ranks that may own what has left this rank's subdomain, or (m) is as near to it, ascending; each of them has this one among
+  /// its own. Local.
+  virtual std::vector<int> neighbours(double width) const = 0;
   /// Shifts by which periodic images of a place near this rank may differ, the zero shift first (m).
   virtual const std::vector<Vec3>& image_shifts() const = 0;
 

@@ -214,9 +214,14 @@ bool EngineRanks::is_far_out(const Vec3& place) const {
   return count > 1 && ((place.array() < lo_.array() - slack).any() || (place.array() > hi_.array() + slack).any());
 }
 
-std::vector<int> EngineRanks::neighbours() const {
+/// Between two builds an atom may go farther, as where a fix drives it: whom it comes near has no ghost of it either.
+auto EngineRanks::partners_within(double width) const -> const std::vector<Partner>& {
+  return partners(far_out_ ? std::numeric_limits<double>::infinity() : width + neighbor->cutneighmax);
+}
+
+std::vector<int> EngineRanks::neighbours(double width) const {
   std::vector<int> ranks;
-  for (const Partner& p : partners(far_out_ ? std::numeric_limits<double>::infinity() : neighbor->cutneighmax))
+  for (const Partner& p : partners_within(width))
     if (p.rank != me) ranks.push_back(p.rank);
   return ranks;
 }
@@ -241,8 +246,7 @@ void EngineRanks::exchange_bytes(const void* rows, std::size_t n, std::size_t by
     if (!is_near_a_border(row.at)) continue;
     near_borders.push_back(row);
   }
-  // between two builds an atom may go farther, as where a fix drives it: whom it comes near has no ghost of it either
-  const std::vector<Partner>& all = partners(far_out_ ? std::numeric_limits<double>::infinity() : width + neighbor->cutneighmax);
+  const std::vector<Partner>& all = partners_within(width);
   std::vector<std::vector<char>> out(all.size());
   for (std::size_t p = 0; p < all.size(); ++p)
     for (const Vec3& shift : all[p].shifts)

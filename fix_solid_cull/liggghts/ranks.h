@@ -46,7 +46,7 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
   int hops() const override;
   bool is_far_out(const Vec3& place) const override;
   void expect_far_out(bool on) override { far_out_ = on; }
-  std::vector<int> neighbours() const override;
+  std::vector<int> neighbours(double width) const override;
   const std::vector<Vec3>& image_shifts() const override { return shifts_; }
   std::unique_ptr<SharedFile> open_to_write(const std::string& file) const override;
 
@@ -65,6 +65,7 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
   };
   RankGrid grid() const;
   const std::vector<Partner>& partners(double reach) const;
+  const std::vector<Partner>& partners_within(double width) const;
   void forget_sent() const;
 
   RankGrid grid_;                               // as it was at the last update()

@@ -286,7 +286,7 @@ int SmallRanks::owner(const Vec3& place) const {
 
 int SmallRanks::hops() const { return world_.deck.split[0] + world_.deck.split[1] + world_.deck.split[2] - 3; }
 
-std::vector<int> SmallRanks::neighbours() const {
+std::vector<int> SmallRanks::neighbours(double) const {
   std::vector<int> others;
   for (int r = 0; r < count; ++r)
     if (r != me) others.push_back(r);

@@ -267,7 +267,7 @@ class SmallRanks : public Ranks {
   int hops() const override;
   bool is_far_out(const Vec3&) const override { return false; }  // rows go to all ranks here
   void expect_far_out(bool) override {}
-  std::vector<int> neighbours() const override;
+  std::vector<int> neighbours(double width) const override;
   const std::vector<Vec3>& image_shifts() const override { return shifts_; }
   std::unique_ptr<SharedFile> open_to_write(const std::string& file) const override;
 

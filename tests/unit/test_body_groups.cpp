@@ -162,6 +162,25 @@ TEST(BodyGroups, a_body_that_is_tied_to_its_own_periodic_image_turns_about_that_
   }
 }
 
+TEST(BodyGroups, a_contact_ties_two_ranks_where_only_one_of_them_sees_the_other_end) {
+  run_on_ranks(ranks_along_x(2, 0.4), [](SmallWorld& w) {
+    Row row(w, some_velocities(8), -3.5 * apart);
+    BedState& bed = row.parts.bed;
+    if (const int at_border = w.at(5); at_border >= 0) {  // it went to another site, out of the other rank's sight
+      const Locked& e = bed.shell[at_border];
+      bed.shell.set_place(at_border, {e.body, Vec3(e.place + Vec3(0.1, 0, 0))});
+    }
+    row.parts.bed.groups.settle();
+    ASSERT_EQ(bed.solid.bodies().size(), 1u);
+    const int number = bed.solid.bodies().bodies().begin()->first;
+    EXPECT_TRUE(row.parts.bed.groups.spans(number));
+    std::int64_t keys[] = {row.parts.bed.groups.key_of(number), -row.parts.bed.groups.key_of(number)};
+    w.ranks.largest(keys, 2);
+    EXPECT_EQ(keys[0], -keys[1]) << "one body";
+    EXPECT_NEAR(row.body()->motion.mass(), 8 * w.mass_of(r), 1e-15);
+  });
+}
+
 TEST(BodyGroups, what_came_apart_at_a_border_is_two_bodies_again_each_with_its_own_motion) {
   run_on_ranks(ranks_along_x(2), [](SmallWorld& w) {
     Row row(w, some_velocities(8), -3.5 * apart);

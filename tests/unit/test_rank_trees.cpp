@@ -71,7 +71,7 @@ class Crowd {
     void move_cuts(const std::array<std::vector<double>, 3>&) override {}
     bool is_far_out(const Vec3&) const override { return false; }
     void expect_far_out(bool) override {}
-    std::vector<int> neighbours() const override { return {}; }
+    std::vector<int> neighbours(double) const override { return {}; }
     const std::vector<Vec3>& image_shifts() const override {
       static const std::vector<Vec3> none{Vec3::Zero()};
       return none;
