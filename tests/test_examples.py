@@ -233,7 +233,7 @@ class Validation(Scripts):
         few = ROOT / "validation" / "scaling" / "out" / "few"
         shutil.rmtree(few / "runs", ignore_errors=True)  # figures of this launcher
         records = self.run_script(few.parents[1] / "scaling.py", few / "scaling.json")
-        self.assertEqual([(r["what"], r["scene"]) for r in records], [("counts", "impact"), ("counts", "blade"), ("counts", "impact"), ("times", "impact")])
+        self.assertEqual([(r["what"], r["scene"]) for r in records], [("counts", "impact"), ("counts", "blade"), ("counts", "impact"), ("times", "impact"), ("balance", "corner")])
         for r in records[:3]:
             with self.subTest(scene=r["scene"], way=r["way"]):
                 self.assertEqual((r["ranks"], r["steps"], r["looks"]), (2, 50, 2))
@@ -243,6 +243,11 @@ class Validation(Scripts):
                     self.assertGreater(r[who]["received"]["mean"], 0)
                 self.assertGreaterEqual(r["atoms"]["most"], r["atoms"]["mean"])
                 self.assertEqual(r["plug-in"]["file reads"], 0)
+        corner = records[-1]
+        self.assertEqual((corner["ranks"], corner["still"]["moves"]), (2, 0), "nothing is above a threshold of a thousand")
+        for of in (corner["still"], corner["moved"]):
+            self.assertGreaterEqual(of["most"], of["mean"])
+            self.assertGreaterEqual(of["mean"], 1)
         for file in ("scaling.txt", "model.png"):
             self.assertGreater((few / file).stat().st_size, 0)
 

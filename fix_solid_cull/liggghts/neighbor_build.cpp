@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <numeric>
 #include <vector>
 
@@ -19,6 +20,7 @@
 #include "neighbor.h"
 #include "sphere_bins.h"
 #include "sphere_levels.h"
+#include "whole_bed_forces.h"
 
 namespace {
 
@@ -100,10 +102,22 @@ void Neighbor::granular_bin_no_newton(NeighList* list) {
     kept->ipage->reset();
     kept->dpage->reset();
   }
+  const auto touches_nothing = [&](int i) { return atom->radius[i] == solidcull::WholeBedForces::radius_without_contacts; };
+  bool some_touch_nothing = false;
+  for (int i = 0; i < all; ++i) some_touch_nothing = some_touch_nothing || touches_nothing(i);
+  std::vector<Near> those_that_touch;
   for (int i = 0; i < owned; ++i) {
-    const std::vector<Near>& near =
+    const std::vector<Near>& found =
         by_bins ? near_bins.above(i, atom->x[i], atom->radius[i], bin[i]) : by_levels.above(i, atom->x[i], atom->radius[i], bin);
-    const int n = static_cast<int>(by_bins ? near_bins.found() : by_levels.found());
+    int n = static_cast<int>(by_bins ? near_bins.found() : by_levels.found());
+    if (some_touch_nothing) {
+      those_that_touch.clear();
+      if (!touches_nothing(i))
+        std::copy_if(found.begin(), found.begin() + n, std::back_inserter(those_that_touch),
+                     [&](const Near& one) { return !touches_nothing(one.index); });
+      n = static_cast<int>(those_that_touch.size());
+    }
+    const std::vector<Near>& near = some_touch_nothing ? those_that_touch : found;
     int* const partners = list->ipage->get(n);
     int* const touched = kept ? kept->ipage->get(n) : nullptr;
     double* const history = kept ? kept->dpage->get(n * width) : nullptr;

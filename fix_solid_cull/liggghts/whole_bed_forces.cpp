@@ -1,12 +1,14 @@
 #include "whole_bed_forces.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 #include "atom.h"
 #include "comm.h"
 #include "compute.h"
 #include "compute_styles.h"
+#include "domain.h"
 #include "fix.h"
 #include "fix_solid_cull.h"
 #include "force.h"
@@ -52,9 +54,41 @@ WholeBedForces::WholeBedForces(LAMMPS_NS::LAMMPS* lmp, FixSolidCull& fix) : Poin
   fix_.lend_contacts();
   const Swapped working(computing_, true);
   const Swapped setup(update->setupflag, 1);  // the engine's word for: do not advance histories
+  const std::vector<Out> out = take_out();
   list_pairs();
   list_walls();
   compute();
+  put_back(out);
+}
+
+/// A granule without contacts, as it was.
+struct WholeBedForces::Out {
+  int atom;
+  double radius;
+  std::array<double, 3> place;
+};
+
+/// The engine's bins and ghosts are those of the last run: what they do not reach they would write beside their memory.
+auto WholeBedForces::take_out() const -> std::vector<Out> {
+  std::vector<Out> all;
+  const double reach = neighbor->cutneighmax, largest = (1 + 1e-9) * (reach - neighbor->skin);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    double* const x = atom->x[i];
+    bool reached = 2 * atom->radius[i] * neighbor->contactDistanceFactor <= largest;
+    for (int d = 0; d < 3; ++d) reached = reached && x[d] >= domain->sublo[d] - reach && x[d] <= domain->subhi[d] + reach;
+    if (reached) continue;
+    all.push_back({i, atom->radius[i], {x[0], x[1], x[2]}});
+    atom->radius[i] = radius_without_contacts;
+    for (int d = 0; d < 3; ++d) x[d] = 0.5 * (domain->sublo[d] + domain->subhi[d]);
+  }
+  return all;
+}
+
+void WholeBedForces::put_back(const std::vector<Out>& all) const {
+  for (const Out& out : all) {
+    atom->radius[out.atom] = out.radius;
+    std::copy(out.place.begin(), out.place.end(), atom->x[out.atom]);
+  }
 }
 
 WholeBedForces::~WholeBedForces() {

@@ -1,6 +1,8 @@
 // Forces of all granules between two runs: numbers of contacts can be asked for then, as of the unculled bed.
 #pragma once
 
+#include <vector>
+
 #include "pointers.h"
 
 namespace solidcull {
@@ -8,7 +10,8 @@ namespace solidcull {
 class FixSolidCull;
 
 /// While it lives the engine's neighbour lists, ghosts and virials are those of all atoms, computed as a run's setup does:
-/// contact histories do not advance, meshes feel nothing. The forces stay. Collective.
+/// contact histories do not advance, meshes feel nothing. The forces stay. What a program or a command has made larger since the
+/// last run than lists reach, or has moved farther than ghosts do, has no contacts before the next one. Collective.
 class WholeBedForces : protected LAMMPS_NS::Pointers {
  public:
   /// All granules are atoms: the bed of this fix is shown, or nothing is culled.
@@ -18,8 +21,13 @@ class WholeBedForces : protected LAMMPS_NS::Pointers {
 
   /// Meshes are not to hear of contacts now.
   static bool at_work() { return computing_; }
+  /// Of granules, as they are listed now, that have no contacts (m).
+  static constexpr double radius_without_contacts = 1e-30;
 
  private:
+  struct Out;
+  std::vector<Out> take_out() const;
+  void put_back(const std::vector<Out>& all) const;
   void list_pairs();
   void list_walls();
   void compute();

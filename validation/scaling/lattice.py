@@ -25,6 +25,7 @@ class Lattice:
     cells: tuple   # granules along x, y, z
     balls: tuple = (0, 0)  # along x and y, above the bed
     gap: float = 0.0       # m: between balls and bed
+    corner: bool = False   # a ball is two diameters from each of two walls, instead of in the middle
 
     def __post_init__(self):
         nz, diameter = self.cells[2], 2 * RADIUS
@@ -51,7 +52,8 @@ class Lattice:
         bx, by = self.balls
         for i in range(bx):
             for j in range(by):
-                yield 2 * BALL, BALL_DENSITY, (i + 0.5) * self.length / bx, (j + 0.5) * self.width / by, self.top + self.gap + BALL
+                x, y = (4 * BALL,) * 2 if self.corner else ((i + 0.5) * self.length / bx, (j + 0.5) * self.width / by)
+                yield 2 * BALL, BALL_DENSITY, x, y, self.top + self.gap + BALL
 
     def write(self, folder):
         """Writes bed.data, floor.stl and blade.stl; the variables that bed.in takes."""

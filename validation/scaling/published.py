@@ -37,6 +37,11 @@ Calls in which all ranks wait for one another, of the rank with most.
 ## How evenly the work lies
 
 {shares}
+## A blow in a corner
+
+Work of the rank with most over the mean of all ranks, in each step.
+
+{corner}
 ## Times
 
 LIGGGHTS's loop, medians of runs in turns.
@@ -102,6 +107,13 @@ def shares(records):
     head = ["scene", "ranks", "granules", "exterior", "interface", "atoms of a rank, mean", "of the rank with most", "most / mean"]
     return head, [[f"{r['scene']}, {r['way']}", r["ranks"], f"{r['granules']:,}", f"{r['exterior']:,.0f}", f"{r['interface']:,.0f}", f"{r['atoms']['mean']:,.0f}",
                    f"{r['atoms']['most']:,.0f}", f"{r['atoms']['most'] / r['atoms']['mean']:.2f}"] for r in of(records, "counts")]
+
+
+def corner(records):
+    """Where cuts stay, and where `balance` moves them."""
+    head = ["granules", "ranks", "cuts stay: mean", "largest", "cuts move: times", "mean after the first", "largest after it"]
+    return head, [[f"{r['granules']:,}", r["ranks"], f"{r['still']['mean']:.2f}", f"{r['still']['most']:.2f}", r["moved"]["moves"], f"{r['moved']['mean']:.2f}",
+                   f"{r['moved']['most']:.2f}"] for r in of(records, "balance")]
 
 
 def median(values):
@@ -188,7 +200,7 @@ def measured(records):
     return ["what", "value", "of"], rows
 
 
-TABLES = {"collectives": collectives, "messages": messages, "shares": shares, "times": times, "constants": measured, "model": predicted}
+TABLES = {"collectives": collectives, "messages": messages, "shares": shares, "corner": corner, "times": times, "constants": measured, "model": predicted}
 
 
 def table(name, records):

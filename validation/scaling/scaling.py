@@ -2,16 +2,17 @@
 """Counts messages, bytes and work of a culled run on 1 to 16 ranks, times it on one rank and two, and draws from that what a cluster
 would take.
 
-    validation/scaling/scaling.py [--ranks 1,2,4,8,16] [--only counts,times] [--runs N] [--table] [--callers] [--publish] [--few-steps]
+    validation/scaling/scaling.py [--ranks 1,2,4,8,16] [--only counts,times,balance] [--runs N] [--table] [--callers] [--publish] [--few-steps]
 """
 import argparse
 import hashlib
 import json
+import math
 import re
 import statistics
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -25,7 +26,10 @@ from solidcull_runs import engine, errors  # noqa: E402
 GRIDS = {1: (1, 1), 2: (2, 1), 4: (2, 2), 8: (4, 2), 16: (4, 4)}  # ranks along x and y
 EVERY, ROWS, TIME_STEP = 25, 50, 3e-5  # steps between looks, between two dumps; s. As bed.in has them
 BALL_SPEED = 1.5                       # m/s
-SCENES = {"impact": 1, "blade": 2}     # the tool, as bed.in calls it
+SCENES = {"impact": 1, "blade": 2, "corner": 1}  # the tool, as bed.in calls it
+TIMED = "impact", "blade"
+MOVE_EVERY, MOVE_ABOVE, NEVER = 20, 1.1, 1000.0  # steps between moves of cuts; the threshold of `balance`, and one that is never met
+MOVED = re.compile(r"cuts between ranks moved (\d+) times; (?:so far|after the first time) the most loaded rank had (\S+) times the mean work on average, (\S+) at most")
 
 
 @dataclass
@@ -35,10 +39,12 @@ class Effort:
     before: int = 150
     steps: int = 300
     timed: int = 600
+    struck: int = 450              # steps of a blow in a corner
+    beds: tuple = ((28, 28, 26), (56, 56, 52))  # for it
     out: Path = HERE / "out"
 
 
-FEW = Effort((8, 8, 6), (7, 7, 5), 100, 50, 50, HERE / "out" / "few")
+FEW = Effort((8, 8, 6), (7, 7, 5), 100, 50, 50, 50, ((8, 8, 6),), HERE / "out" / "few")
 
 
 @dataclass
@@ -60,8 +66,8 @@ class Case:
     def bed(self):
         many = self.way == "weak"
         cells = tuple(n * k for n, k in zip(self.effort.tile, (*self.grid, 1))) if many else self.effort.strong
-        balls = (self.grid if many else (1, 1)) if self.scene == "impact" else (0, 0)
-        return Lattice(cells, balls, BALL_SPEED * self.effort.before * TIME_STEP)
+        balls = (0, 0) if self.scene == "blade" else self.grid if many else (1, 1)
+        return Lattice(cells, balls, BALL_SPEED * self.effort.before * TIME_STEP, self.scene == "corner")
 
     def variables(self, steps):
         return {"tool": SCENES[self.scene], "grid": f"{self.grid[0]} {self.grid[1]} 1", "before": self.effort.before, "steps": steps}
@@ -164,12 +170,38 @@ def time_record(case, runs):
     return kept(case.effort, f"times-{case.scene}", recipe_of(case, runs), make)
 
 
+def share_record(cells, ranks, effort):
+    """How evenly the work lies where a ball strikes a corner of the bed, and where cuts follow it."""
+    case = Case("corner", "strong", ranks, replace(effort, strong=cells))
+
+    def run(threshold):
+        folder, variables = place_of(case, effort)
+        cull = f"fix cull all solid/cull every {EVERY} balance {MOVE_EVERY} {threshold:g} report full"
+        text = engine.Process(engine.find_launcher(), "bed.in", folder, folder / "log",
+                              {**variables, **case.variables(effort.struck), "cull": cull}, ranks).wait()
+        found = MOVED.findall(text)
+        if len(found) != 2:
+            raise errors.RunError(f"corner on {ranks} ranks: the run does not say how its cuts moved")
+        (_, quiet, _), (moves, mean, most) = [(int(n), float(a), float(b)) for n, a, b in found]
+        if not moves:  # so far: the steps before the blow are in it
+            mean = (mean * (effort.before + effort.struck) - quiet * effort.before) / effort.struck
+        return {"moves": moves, "mean": mean, "most": most, "counts": fix_counts(text)}
+
+    def make():
+        still, moved = run(NEVER), run(MOVE_ABOVE)
+        exterior, interface, interior = moved["counts"]
+        return {"what": "balance", "scene": "corner", "granules": case.bed().granules, "ranks": ranks, "steps": effort.struck,
+                "exterior": exterior, "interface": interface, "interior": interior,
+                **{name: {k: of[k] for k in ("moves", "mean", "most")} for name, of in (("still", still), ("moved", moved))}}
+    return kept(effort, f"corner-{math.prod(cells)}-{ranks}", recipe_of(case), make)
+
+
 # --- the command ----------------------------------------------------------------------------------------------------
 
 def options(argv=None):
     p = argparse.ArgumentParser(prog="scaling", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--ranks", default=",".join(map(str, GRIDS)), metavar="LIST", help=f"of these: {', '.join(map(str, GRIDS))}")
-    p.add_argument("--only", default="counts,times", metavar="LIST", help="counts, times")
+    p.add_argument("--only", default="counts,times,balance", metavar="LIST", help="counts, times, balance")
     p.add_argument("--runs", type=int, default=3, metavar="N", help="of each kind, for the times (default 3)")
     p.add_argument("--table", action="store_true", help="prints what was measured before; runs nothing")
     p.add_argument("--callers", action="store_true", help="prints which functions of the fix call MPI, and how often")
@@ -181,8 +213,8 @@ def options(argv=None):
     except ValueError:
         p.error("--ranks takes numbers with commas between")
     a.only = a.only.split(",")
-    if not set(a.ranks) <= set(GRIDS) or not set(a.only) <= {"counts", "times"} or a.runs < 1:
-        p.error(f"--ranks takes {', '.join(map(str, GRIDS))}; --only takes counts, times; --runs 1 or more")
+    if not set(a.ranks) <= set(GRIDS) or not set(a.only) <= {"counts", "times", "balance"} or a.runs < 1:
+        p.error(f"--ranks takes {', '.join(map(str, GRIDS))}; --only takes counts, times, balance; --runs 1 or more")
     return a
 
 
@@ -196,7 +228,7 @@ def check(records, effort):
                 raise errors.RunError(f"{what}: {r['steps']} steps and {r['looks']} looks were counted, not {effort.steps} and {effort.steps // EVERY}")
             if r["ranks"] > 1 and not (of["step"] > 0 and of["all"] > of["step"]):
                 raise errors.RunError(f"{what} on {r['ranks']} ranks: no collective of the fix was counted: is it in libsolidcull.so?")
-        balls = 1 if r["scene"] == "impact" else 0
+        balls = 0 if r["scene"] == "blade" else 1
         due = r["granules"] + (balls * (r["ranks"] if r.get("way") == "weak" else 1))
         there = r["exterior"] + r["interface"] + r["interior"]
         if abs(there - due) > 1e-6 * due:
@@ -220,7 +252,9 @@ def main():
             cases = cases[1::2] if a.few_steps else cases
             records += [count_record(case) for case in cases]
         if "times" in a.only:
-            records += [time_record(Case(scene, "strong", 1, effort), runs) for scene in (["impact"] if a.few_steps else SCENES)]
+            records += [time_record(Case(scene, "strong", 1, effort), runs) for scene in (["impact"] if a.few_steps else TIMED)]
+        if "balance" in a.only:
+            records += [share_record(cells, n, effort) for cells in effort.beds for n in ranks if n > 1]
         check(records, effort)
         file.write_text(json.dumps(records, indent=1) + "\n")
     text = published.text_of(records)
