@@ -100,11 +100,7 @@ std::vector<char> Grounding::update() {
     }
     const ActiveBody* const* of = loads.find(number);
     const int* one = only_atom.find(number);
-    if (!held || !of || !is_at_rest(body, **of, one)) {
-      body.looks_at_rest = 0;
-      continue;
-    }
-    if (++body.looks_at_rest < looks_to_ground) continue;
+    if (body.rests(held && of && is_at_rest(body, **of, one)) < looks_to_ground) continue;
     if (over_ranks >= 0) {
       grounds[static_cast<std::size_t>(over_ranks)] = 1;
       continue;
@@ -145,8 +141,7 @@ void Grounding::press_on_walls() {
   // a body that stands still in spite of a load hands it on to the walls that hold it
   for (const ActiveBody& a : motion_.active()) {
     if (!a.stands) continue;
-    a.body->pressed = true;
-    a.body->extra_load += (a.change - a.body->extra_load) / bed_.scales.look_every();
+    a.body->bear(a.change, bed_.scales.look_every());
     if (a.change.isZero(0)) continue;
     for (const auto& [place, e] : bed_.solid.wall_loads().of(a.number)) {
       if (!(e.share > 0)) continue;

@@ -122,6 +122,13 @@ struct SolidBody {
   /// Walls hold it from now on, or do no longer. It stands still; a sphere may go on spinning on the spot.
   void ground(bool on);
   void begin_to_rest();  ///< what is counted and summed since it was grounded or let go
+  /// How many looks in a row it has rested now.
+  std::int64_t rests(bool at_rest) { return looks_at_rest = at_rest ? looks_at_rest + 1 : 0; }
+  /// What its walls bear in this step beyond what is frozen (N).
+  void bear(const Vec3& extra, int steps_of_mean) {
+    pressed = true;
+    extra_load += (extra - extra_load) / steps_of_mean;
+  }
   /// A body of one granule, which stands at this place of the world: its frame becomes the world's.
   void reframe_one(const GranuleMass& in_world);
 

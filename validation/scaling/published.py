@@ -123,12 +123,12 @@ def median(values):
 
 def times(records):
     """Of LIGGGHTS's loop."""
-    head = ["scene", "runs", "LIGGGHTS, 1 rank", "2 ranks", "faster", "with the line, 1 rank", "2 ranks", "faster"]
+    head = ["scene", "granules", "runs", "LIGGGHTS, 1 rank", "2 ranks", "faster", "with the line, 1 rank", "2 ranks", "faster", "2 ranks, `balance`"]
     rows = []
     for r in of(records, "times"):
         t = {kind: median(values) for kind, values in r["seconds"].items()}
-        rows.append([r["scene"], r["runs"], *(cell for kind in ("unculled", "culled") for cell in (
-            f"{t[kind + ' 1']:.2f} s", f"{t[kind + ' 2']:.2f} s", f"{t[kind + ' 1'] / t[kind + ' 2']:.2f} times"))])
+        rows.append([r["scene"], f"{r['granules']:,}", r["runs"], *(cell for kind in ("unculled", "culled") for cell in (
+            f"{t[kind + ' 1']:.2f} s", f"{t[kind + ' 2']:.2f} s", f"{t[kind + ' 1'] / t[kind + ' 2']:.2f} times")), f"{t['balanced 2']:.2f} s"])
     return head, rows
 
 

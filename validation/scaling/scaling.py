@@ -39,12 +39,13 @@ class Effort:
     before: int = 150
     steps: int = 300
     timed: int = 600
+    timed_bed: tuple = (56, 56, 52)
     struck: int = 450              # steps of a blow in a corner
     beds: tuple = ((28, 28, 26), (56, 56, 52))  # for it
     out: Path = HERE / "out"
 
 
-FEW = Effort((8, 8, 6), (7, 7, 5), 100, 50, 50, 50, ((8, 8, 6),), HERE / "out" / "few")
+FEW = Effort((8, 8, 6), (7, 7, 5), 100, 50, 50, (8, 8, 6), 50, ((8, 8, 6),), HERE / "out" / "few")
 
 
 @dataclass
@@ -147,26 +148,30 @@ def count_record(case):
     return kept(effort, case.name, recipe_of(case), make)
 
 
-def timed_run(case, culled, k):
+KINDS = ("unculled", 1), ("unculled", 2), ("culled", 1), ("culled", 2), ("balanced", 2)  # and ranks
+
+
+def timed_run(case, kind, k):
     """Seconds of LIGGGHTS's loop, and means of the counts."""
     effort = case.effort
     folder, variables = place_of(Case(f"{case.scene}", f"{case.way}-timed", case.ranks, effort), effort)
-    variables = {**variables, **case.variables(effort.timed), **({} if culled else {"cull": "", "counts": "atoms atoms atoms"})}
+    variables = {**variables, **case.variables(effort.timed), **{
+        "culled": {}, "balanced": {"cull": f"fix cull all solid/cull every {EVERY} balance {MOVE_EVERY} {MOVE_ABOVE}"},
+        "unculled": {"cull": "", "counts": "atoms atoms atoms"}}[kind]}
     text = engine.Process(engine.find_launcher(), "bed.in", folder, folder / "log", variables, case.ranks).wait()
     return {"seconds": [float(t) for t in re.findall(r"^Loop time of (\S+)", text, re.M)][-1], "counts": fix_counts(text), "run": k}
 
 
 def time_record(case, runs):
     def make():
-        found = {(culled, ranks): [] for culled in (False, True) for ranks in (1, 2)}
+        found = {kind: [] for kind in KINDS}
         for k in range(runs):
-            for culled, ranks in found:
-                found[culled, ranks].append(timed_run(Case(case.scene, case.way, ranks, case.effort), culled, k))
-        exterior, interface, interior = found[True, 1][0]["counts"]
+            for kind, ranks in KINDS:
+                found[kind, ranks].append(timed_run(Case(case.scene, case.way, ranks, case.effort), kind, k))
+        exterior, interface, interior = found["culled", 1][0]["counts"]
         return {"what": "times", "scene": case.scene, "granules": case.bed().granules, "steps": case.effort.timed, "runs": runs,
                 "exterior": exterior, "interface": interface, "interior": interior,
-                "seconds": {f"{'culled' if culled else 'unculled'} {ranks}": [round(run["seconds"], 4) for run in of]
-                            for (culled, ranks), of in found.items()}}
+                "seconds": {f"{kind} {ranks}": [round(run["seconds"], 4) for run in of] for (kind, ranks), of in found.items()}}
     return kept(case.effort, f"times-{case.scene}", recipe_of(case, runs), make)
 
 
@@ -252,7 +257,7 @@ def main():
             cases = cases[1::2] if a.few_steps else cases
             records += [count_record(case) for case in cases]
         if "times" in a.only:
-            records += [time_record(Case(scene, "strong", 1, effort), runs) for scene in (["impact"] if a.few_steps else TIMED)]
+            records += [time_record(Case(scene, "strong", 1, replace(effort, strong=effort.timed_bed)), runs) for scene in (["impact"] if a.few_steps else TIMED)]
         if "balance" in a.only:
             records += [share_record(cells, n, effort) for cells in effort.beds for n in ranks if n > 1]
         check(records, effort)
