@@ -19,6 +19,7 @@ from shrink import shrink  # noqa: E402
 SEEDS = (6, 10, 11, 12, 16, 21, 23, 25, 28, 29, 31, 32, 34, 37, 42, 43, 44, 46, 47, 49)  # of 50, those that cull
 RANKS = (1, 1, 1, 1, 2)
 MORE_SEEDS = (2008, 2026, 2031, 2034)           # went wrong before what they try was taken
+MANY_RANKS_SEEDS = (1112,)                      # on four ranks, whose cuts move
 LIBRARY_SEEDS = (2012, 2013, 2027, 2036, 2037)  # likewise
 HEAD = """\
 atom_style granular
@@ -96,6 +97,16 @@ class RandomDecks(unittest.TestCase):
                         with self.subTest(seed=seed, run=what, library=library):
                             self.assertEqual(verdict.kind, "good", f"{verdict.text}\ntests/fuzz/fuzz.py --seed {seed} --count 1 --ranks "
                                              f"{','.join(map(str, RANKS))} --library {'all' if library else 'none'} --shrink")
+
+
+    def test_decks_on_many_ranks(self):
+        with tempfile.TemporaryDirectory(prefix="solidcull-fuzz-") as folder:
+            for seed in MANY_RANKS_SEEDS:
+                with self.subTest(seed=seed):
+                    deck = grammar.make(seed)
+                    self.assertGreater(deck.ranks[0], 2)
+                    verdict = fuzz.verdict_of(deck, Path(folder) / str(seed))
+                    self.assertEqual(verdict.kind, "good", f"{verdict.text}\ntests/fuzz/fuzz.py --seed {seed} --count 1 --shrink")
 
 
 class Grammar(unittest.TestCase):

@@ -168,10 +168,14 @@ bool Change::meet_new_granules(Phase phase) {
   return overlaps;
 }
 
+/// Whether interface granules may go to the store though nothing else changes.
+bool Change::stores_asleep() const { return bed_.scales.sleeping() && bed_.census.something_locked(); }
+
 /// Invariant I1: what is near comes out of the store.
 void Change::close_shell(bool changes, bool& shell_changed) {
   const auto timed = p_.report.time(Part::shell);
-  if (changes || bed_.census.something_stored()) p_.closure.share();
+  // what goes to the store asks for them, too, be it the first that does
+  if (changes || bed_.census.something_stored() || stores_asleep()) p_.closure.share();
   if (bed_.census.something_stored()) shell_changed |= p_.closure.fetch_what_is_near() > 0;
 }
 
@@ -182,7 +186,7 @@ void Change::pack(bool& shell_changed) {
 
 /// And what nothing is near goes in.
 void Change::store_and_fetch(const MembershipChange& c, const Occasion& now, bool changes, bool& shell_changed) {
-  if (changes || (bed_.scales.sleeping() && bed_.census.something_locked()))
+  if (changes || stores_asleep())
     shell_changed |= p_.deep.store({c.locked_some(), now.asks_to_store, changes, now.highest},
                                    [&](const std::vector<int>& atoms, const DeepGranules::Near& near) {
                                      return p_.refill.acts() ? p_.refill.put_away(atoms, near) : p_.exchange.put_away(atoms);

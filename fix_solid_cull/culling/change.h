@@ -49,6 +49,7 @@ class Change {
   void move_cuts();
   void take_subdomains();
   bool meet_new_granules(Phase phase);
+  bool stores_asleep() const;
   void close_shell(bool changes, bool& shell_changed);
   void pack(bool& shell_changed);
   void store_and_fetch(const MembershipChange& c, const Occasion& now, bool changes, bool& shell_changed);
