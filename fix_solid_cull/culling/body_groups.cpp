@@ -23,19 +23,28 @@ auto BodyGroups::key_of_atom(int i) const -> Key {
   return key ? *key : 0;
 }
 
-/// Stored granules that may touch one of another rank.
+/// Stored granules that may touch one of another rank. Those of bodies that have never moved lie on the rank that owns their
+/// place, unless they went to another site, and so does what they touch.
 std::vector<std::int64_t> BodyGroups::stored_at_borders() const {
   std::vector<std::int64_t> tags;
   const Run& run = bed_.run;
   const double reach = 2 * bed_.solid.store().largest_radius() + run.skin + stored_.slack();
+  const double touch = 1.01 * bed_.contacts.reach_factor * (bed_.solid.store().largest_radius() + bed_.largest_radius) + run.skin;
   const Vec3 edges = run.edges();
   const Vec3 out = Vec3::Constant(reach + edges[0] + edges[1] + edges[2]);
   const Box own = bed_.ranks.own();
   for (int d = 0; d < 3; ++d)
     for (const bool upper : {false, true}) {
+      const bool at_side = upper ? own.hi[d] >= run.box.hi[d] : own.lo[d] <= run.box.lo[d];
+      if (at_side && !run.periodic[d]) continue;  // nobody is there
       Vec3 from = own.lo - out, to = own.hi + out;
       (upper ? from : to)[d] = upper ? own.hi[d] - reach : own.lo[d] + reach;
-      stored_.for_each_in_box(from, to, [&](const Resident& g) { tags.push_back(g.tag); });
+      const double from_border = upper ? own.hi[d] : own.lo[d];
+      stored_.for_each_in_box(from, to, [&](const Resident& g) {
+        const bool lies_still =
+            bed_.solid.stands_in_store(g.body) && bed_.solid.store().frame_of(g.body) == GranuleStore::shared_frame;
+        if (!lies_still || std::abs(g.position[d] - from_border) < touch) tags.push_back(g.tag);
+      });
     }
   std::sort(tags.begin(), tags.end());
   tags.erase(std::unique(tags.begin(), tags.end()), tags.end());
@@ -58,7 +67,8 @@ void BodyGroups::group() {
   const auto reaches_out = [&](std::int64_t tag) {
     const int body = bodies.body_of(tag);
     if (!body) return;
-    bed_.solid.contacts().for_each_partner(tag, [&](std::int64_t partner) {
+    // what is known from elsewhere has both ends in this rank's store
+    bed_.solid.contacts().for_each_partner_here(tag, [&](std::int64_t partner) {
       if (bodies.body_of(partner)) return;
       const Vec3 x = bodies.pose(body).to_world(masses_(tag).position);
       ends.push_back(

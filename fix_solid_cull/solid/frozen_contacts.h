@@ -73,8 +73,13 @@ class FrozenContacts {
   /// Partners only; cheaper.
   template <class Visit>
   void for_each_partner(std::int64_t tag, Visit visit) const {
-    for (std::uint32_t e = first(tag); e != none; e = next(e, tag)) visit(other(e, tag));
+    for_each_partner_here(tag, visit);
     if (elsewhere_) for_each_elsewhere(tag, visit);
+  }
+  /// Those of them whose contacts stand in the graph.
+  template <class Visit>
+  void for_each_partner_here(std::int64_t tag, Visit visit) const {
+    for (std::uint32_t e = first(tag); e != none; e = next(e, tag)) visit(other(e, tag));
   }
   /// Those of them that are known from elsewhere.
   template <class Visit>
