@@ -674,6 +674,10 @@ TEST(SolidBodies, the_state_of_a_body_has_what_holds_it) {
   body.mass.held = 2;
   body.grounded = true;
   body.grounded_mass = 0.75;
+  EXPECT_EQ(body.rests(true), 1);
+  EXPECT_EQ(body.rests(true), 2);
+  body.bear({8, 0, -4}, 4);
+  body.bear({2, 0, -1}, 4);
   std::vector<double> numbers;
   body.each_number([&](auto& n) { numbers.push_back(static_cast<double>(n)); });
   std::size_t at = 0;
@@ -684,8 +688,14 @@ TEST(SolidBodies, the_state_of_a_body_has_what_holds_it) {
   EXPECT_EQ(back.mass.mass, body.mass.mass);
   EXPECT_TRUE(back.grounded);
   EXPECT_EQ(numbers[8], 2.0) << "after origin, attitude and count";
-  EXPECT_EQ(numbers.back(), 0.75);
   EXPECT_EQ(back.grounded_mass, 0.75);
+  EXPECT_EQ(back.looks_at_rest, 2);
+  EXPECT_TRUE(back.pressed);
+  EXPECT_EQ(back.extra_load, Vec3(2, 0, -1)) << "2 + (2 - 2) / 4";
+  back.ground(false);
+  EXPECT_EQ(back.looks_at_rest, 0) << "counted anew";
+  EXPECT_FALSE(back.pressed);
+  EXPECT_EQ(back.rests(false), 0);
 }
 
 TEST(SolidBodies, a_member_takes_14_bytes) {
