@@ -39,11 +39,11 @@ std::vector<std::int64_t> BodyGroups::stored_at_borders() const {
       if (at_side && !run.periodic[d]) continue;  // nobody is there
       Vec3 from = own.lo - out, to = own.hi + out;
       (upper ? from : to)[d] = upper ? own.hi[d] - reach : own.lo[d] + reach;
-      const double from_border = upper ? own.hi[d] : own.lo[d];
       stored_.for_each_in_box(from, to, [&](const Resident& g) {
         const bool lies_still =
             bed_.solid.stands_in_store(g.body) && bed_.solid.store().frame_of(g.body) == GranuleStore::shared_frame;
-        if (!lies_still || std::abs(g.position[d] - from_border) < touch) tags.push_back(g.tag);
+        const double depth = upper ? own.hi[d] - g.position[d] : g.position[d] - own.lo[d];
+        if (!lies_still || depth < touch) tags.push_back(g.tag);
       });
     }
   std::sort(tags.begin(), tags.end());

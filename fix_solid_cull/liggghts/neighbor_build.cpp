@@ -104,7 +104,8 @@ void Neighbor::granular_bin_no_newton(NeighList* list) {
   }
   const auto touches_nothing = [&](int i) { return atom->radius[i] == solidcull::WholeBedForces::radius_without_contacts; };
   bool some_touch_nothing = false;
-  for (int i = 0; i < all; ++i) some_touch_nothing = some_touch_nothing || touches_nothing(i);
+  for (int i = 0; solidcull::WholeBedForces::at_work() && i < all; ++i)
+    some_touch_nothing = some_touch_nothing || touches_nothing(i);
   std::vector<Near> those_that_touch;
   for (int i = 0; i < owned; ++i) {
     const std::vector<Near>& found =
