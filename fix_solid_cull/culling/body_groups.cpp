@@ -23,34 +23,6 @@ auto BodyGroups::key_of_atom(int i) const -> Key {
   return key ? *key : 0;
 }
 
-/// Stored granules that may touch one of another rank. Those of bodies that have never moved lie on the rank that owns their
-/// place, unless they went to another site, and so does what they touch.
-std::vector<std::int64_t> BodyGroups::stored_at_borders() const {
-  std::vector<std::int64_t> tags;
-  const Run& run = bed_.run;
-  const double reach = 2 * bed_.solid.store().largest_radius() + run.skin + stored_.slack();
-  const double touch = 1.01 * bed_.contacts.reach_factor * (bed_.solid.store().largest_radius() + bed_.largest_radius) + run.skin;
-  const Vec3 edges = run.edges();
-  const Vec3 out = Vec3::Constant(reach + edges[0] + edges[1] + edges[2]);
-  const Box own = bed_.ranks.own();
-  for (int d = 0; d < 3; ++d)
-    for (const bool upper : {false, true}) {
-      const bool at_side = upper ? own.hi[d] >= run.box.hi[d] : own.lo[d] <= run.box.lo[d];
-      if (at_side && !run.periodic[d]) continue;  // nobody is there
-      Vec3 from = own.lo - out, to = own.hi + out;
-      (upper ? from : to)[d] = upper ? own.hi[d] - reach : own.lo[d] + reach;
-      stored_.for_each_in_box(from, to, [&](const Resident& g) {
-        const bool lies_still =
-            bed_.solid.stands_in_store(g.body) && bed_.solid.store().frame_of(g.body) == GranuleStore::shared_frame;
-        const double depth = upper ? own.hi[d] - g.position[d] : g.position[d] - own.lo[d];
-        if (!lies_still || depth < touch) tags.push_back(g.tag);
-      });
-    }
-  std::sort(tags.begin(), tags.end());
-  tags.erase(std::unique(tags.begin(), tags.end()), tags.end());
-  return tags;
-}
-
 /// A contact across ranks ties the bodies of its two ends: each rank shows its end to its neighbours.
 void BodyGroups::group() {
   bed_.solid.tell_settled();
@@ -64,21 +36,16 @@ void BodyGroups::group() {
   };
   std::vector<End> ends;
   const SolidBodies& bodies = bed_.solid.bodies();
-  const auto reaches_out = [&](std::int64_t tag) {
-    const int body = bodies.body_of(tag);
-    if (!body) return;
-    // what is known from elsewhere has both ends in this rank's store
-    bed_.solid.contacts().for_each_partner_here(tag, [&](std::int64_t partner) {
-      if (bodies.body_of(partner)) return;
-      const Vec3 x = bodies.pose(body).to_world(masses_(tag).position);
-      ends.push_back(
-          {triple(bed_.run.wrapped(x)), triple(x), std::min(tag, partner), std::max(tag, partner), bed_.ranks.me, body});
-    });
-  };
-  for (int i = 0; i < bed_.atoms.owned; ++i)
-    if (bed_.shell[i].locked) reaches_out(bed_.atoms.tag[i]);
-  for (const std::int64_t tag : stored_at_borders()) reaches_out(tag);
-  bed_.arrivals.for_each_tag(reaches_out);
+  // two stored granules of which one is elsewhere have their contact in the graph, too
+  bed_.solid.review_contacts([&](std::int64_t low, std::int64_t high) {
+    const int of_low = bodies.body_of(low), of_high = bodies.body_of(high);
+    if (of_low && of_high) return false;
+    if (!of_low && !of_high) return true;
+    const int body = of_low ? of_low : of_high;
+    const Vec3 x = bodies.pose(body).to_world(masses_(of_low ? low : high).position);
+    ends.push_back({triple(bed_.run.wrapped(x)), triple(x), low, high, bed_.ranks.me, body});
+    return true;
+  });
 
   std::map<std::pair<std::int64_t, std::int64_t>, const End*> own;
   for (const End& e : ends) own[{e.low, e.high}] = &e;

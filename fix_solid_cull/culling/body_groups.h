@@ -18,7 +18,9 @@ class BodyGroups {
   using Key = std::int64_t;
 
   BodyGroups(BedState& bed, const StoredSearch& stored, const GranuleMasses& masses)
-      : bed_(bed), stored_(stored), masses_(masses), trees_(bed.ranks) {}
+      : bed_(bed), stored_(stored), masses_(masses), trees_(bed.ranks) {
+    if (bed.ranks.count > 1) bed_.solid.begin_reviews();
+  }
 
   // --- local
   Key key_of(int body) const;
@@ -64,7 +66,6 @@ class BodyGroups {
   void release_memory();
 
  private:
-  std::vector<std::int64_t> stored_at_borders() const;
   void tell_links(std::map<int, std::vector<PartLink>>& links, const std::vector<int>& ranks) const;
   template <class TakesPart>
   void settle_those_over_ranks(TakesPart takes_part);

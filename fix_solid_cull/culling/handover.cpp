@@ -6,9 +6,13 @@
 
 namespace solidcull {
 
-void Handover::merged(int gone, int kept, bool same_frame) {
-  at_home_.erase(gone);
-  if (!same_frame) at_home_.erase(kept);
+/// What came along with the one that is gone was farther out than what it came to.
+void Handover::merged(int gone, int kept, bool) {
+  const auto from = at_home_.find(gone);
+  if (from == at_home_.end()) return;  // nothing of it was stored when the last change ended
+  const auto to = at_home_.find(bed_.solid.store().frame_of(kept));
+  if (to != at_home_.end()) to->second.lag = std::max(to->second.lag, from->second.way + from->second.lag);
+  at_home_.erase(from);
 }
 
 /// A stored one may lag behind by the slack: bodies that have not moved by it since they were last looked through are left.
@@ -17,8 +21,12 @@ std::vector<std::int64_t> Handover::stored_elsewhere() {
   bed_.solid.store().for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
     const Pose& pose = bed_.solid.pose_of_frame(frame);
     const auto then = at_home_.find(frame);
-    if (then != at_home_.end() && largest_way(then->second, pose, lo, hi) < 0.5 * bed_.stored.slack()) return;
-    at_home_[frame] = pose;
+    if (then != at_home_.end()) {
+      Home& home = then->second;
+      home.way = largest_way(home.pose, pose, lo, hi);
+      if (home.way + home.lag < 0.5 * bed_.stored.slack()) return;
+    }
+    at_home_[frame] = {pose};
     bed_.solid.store().for_each_in_box(frame, lo, hi, [&](const Resident& g) {
       if (!bed_.ranks.owns(bed_.solid.in_world(g))) tags.push_back(g.tag);
     });

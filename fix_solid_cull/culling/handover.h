@@ -34,7 +34,7 @@ class Handover : public BodyFollower {
   /// Subdomains are others. Local.
   void forget_homes() { at_home_.clear(); }
 
-  void merged(int gone, int kept, bool same_frame) override;
+  void merged(int gone, int kept, bool) override;
   void frame_changed(int body) override { at_home_.erase(body); }
 
   /// Stored granules whose places are another rank's, of bodies that have moved since the last time. Local.
@@ -44,6 +44,12 @@ class Handover : public BodyFollower {
   struct Leaving {
     std::vector<std::int64_t> atoms, stored;  // tags, ascending
   };
+  /// When its granules were last compared with the subdomain.
+  struct Home {
+    Pose pose;
+    double way = 0;  // since then, when last looked (m)
+    double lag = 0;  // the way of those that have come from other frames without being compared (m)
+  };
   void leave();
 
   Bed& bed_;
@@ -51,7 +57,7 @@ class Handover : public BodyFollower {
   std::vector<LostGranule> before_;      // interface granules of this rank when the engine was last given its atoms
   std::vector<LostGranule> on_the_way_;  // announced by another rank, and lost
   std::map<int, Leaving> leaving_;       // by the rank where they go
-  std::map<int, Pose> at_home_;          // frames of the store when their granules were last compared with the subdomain
+  std::map<int, Home> at_home_;          // frames of the store
 };
 
 }  // namespace solidcull

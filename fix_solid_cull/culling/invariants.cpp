@@ -5,7 +5,9 @@
 #include <cstdlib>
 #include <limits>
 #include <map>
+#include <set>
 #include <string>
+#include <utility>
 
 namespace solidcull {
 namespace {
@@ -95,6 +97,20 @@ void Invariants::check_bodies() const {
              std::to_string((m.mass - sum.mass) / sum.mass * 1e12) + "e-12 of it, centre by " +
              std::to_string((m.centre() - sum.centre()).norm() / bed_.scales.diameter() * 1e9) + "e-9 d");
   }
+}
+
+/// Each is looked at where bodies are grouped.
+void Invariants::check_contacts_across_ranks() const {
+  if (bed_.ranks.count == 1) return;
+  std::set<std::pair<std::int64_t, std::int64_t>> reviewed;
+  const FrozenContacts& contacts = bed_.solid.contacts();
+  contacts.for_each_to_review([&](std::int64_t low, std::int64_t high) { reviewed.emplace(low, high); });
+  const SolidBodies& bodies = bed_.solid.bodies();
+  contacts.for_each_contact([&](std::int64_t low, std::int64_t high, const double*) {
+    if ((bodies.body_of(low) != 0) != (bodies.body_of(high) != 0) && !reviewed.count({low, high}))
+      broken("the contact of granules " + std::to_string(low) + " and " + std::to_string(high) +
+             " across ranks is not looked at");
+  });
 }
 
 }  // namespace solidcull

@@ -14,6 +14,7 @@ class Invariants {
     check_shell_is_closed();
     check_ledger();
     check_bodies();
+    check_contacts_across_ranks();
   }
   static bool asked();
 
@@ -21,6 +22,7 @@ class Invariants {
   void check_shell_is_closed() const;
   void check_ledger() const;
   void check_bodies() const;
+  void check_contacts_across_ranks() const;
 
   const Bed& bed_;
 };

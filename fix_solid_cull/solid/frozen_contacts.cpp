@@ -59,6 +59,7 @@ std::uint32_t FrozenContacts::link(std::int64_t tag, std::int64_t partner) {
     head = e + 1;
   }
   ++count_;
+  if (reviewed_) to_review_.push_back(e);
   return e;
 }
 
@@ -114,13 +115,15 @@ void FrozenContacts::fit() {
   fitting.flips_ = flips_;
   fitting.vectors_ = vectors_;
   fitting.elsewhere_ = elsewhere_;
+  fitting.reviewed_ = reviewed_;
   fitting.histories_ = ChunkedArray<double>(width());
   for_each_contact([&](std::int64_t low, std::int64_t high, const double* history) { fitting.add(low, high, history); });
   *this = std::move(fitting);
 }
 
 std::size_t FrozenContacts::memory_bytes() const {
-  return edges_.memory_bytes() + histories_.memory_bytes() + heads_.memory_bytes();
+  return edges_.memory_bytes() + histories_.memory_bytes() + heads_.memory_bytes() +
+         to_review_.capacity() * sizeof(std::uint32_t);
 }
 
 }  // namespace solidcull

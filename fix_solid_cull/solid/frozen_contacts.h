@@ -3,10 +3,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "chunked_array.h"
@@ -97,6 +99,26 @@ class FrozenContacts {
       const std::int64_t low = edges_[e].low, high = edges_[e].high;
       if (low != high) visit(low, high, read(e, low, seen.data()));
     }
+  }
+
+  /// Contacts that are added from now on are reviewed.
+  void begin_reviews() { reviewed_ = true; }
+  /// keep(low tag, high tag) for each contact that was added since the last review, or that was to be kept for another one:
+  /// whether it is to be kept again. So few are looked at where few are of interest.
+  template <class Keep>
+  void review(Keep keep) {
+    std::sort(to_review_.begin(), to_review_.end());
+    std::vector<std::uint32_t> kept;
+    std::uint32_t last = none;
+    for (const std::uint32_t e : std::exchange(to_review_, {}))
+      if (e != last && edges_[last = e].low != edges_[e].high && keep(edges_[e].low, edges_[e].high)) kept.push_back(e);
+    to_review_ = std::move(kept);
+  }
+  /// Those that the next review sees, some of them more than once.
+  template <class Visit>
+  void for_each_to_review(Visit visit) const {
+    for (const std::uint32_t e : to_review_)
+      if (edges_[e].low != edges_[e].high) visit(edges_[e].low, edges_[e].high);
   }
 
   /// The same history as seen from the other side.
@@ -193,6 +215,8 @@ class FrozenContacts {
   std::uint32_t first_free_ = none;
   FlatMap<std::uint32_t, std::int32_t> heads_;  // tag -> its first edge, counted from 1
   std::vector<std::uint32_t> unturned_;
+  bool reviewed_ = false;
+  std::vector<std::uint32_t> to_review_;
   std::size_t count_ = 0;
   Elsewhere elsewhere_;
 };

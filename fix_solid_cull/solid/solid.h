@@ -70,6 +70,12 @@ class Solid {
   const SolidBodies& bodies() const { return bodies_; }
   const GranuleStore& store() const { return *store_; }
   const FrozenContacts& contacts() const { return contacts_; }
+  /// See FrozenContacts::review(). What was seen to have both ends here comes back when one of them leaves the rank.
+  template <class Keep>
+  void review_contacts(Keep keep) {
+    contacts_.review(keep);
+  }
+  void begin_reviews() { contacts_.begin_reviews(); }
   const FrozenWallLoads& wall_loads() const { return wall_loads_; }
   const Ledger& ledger() const { return ledger_; }
   const std::vector<double>& largest_radius_by_type() const { return largest_radius_by_type_; }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -57,7 +58,17 @@ FreeAxes SolidBody::free_axes(const std::array<bool, 3>& spans) {
   return {!spans[1] && !spans[2], !spans[0] && !spans[2], !spans[0] && !spans[1]};
 }
 
+namespace {
+
+// of a coordinate: what the sums of a body that has rested a while leave, and no granule of it shows
+constexpr double last_digits = 16 * std::numeric_limits<double>::epsilon();
+
+}  // namespace
+
 void SolidBody::ground(bool on) {
+  // the world's frame is cheaper, and all that stand in it share it
+  if (on && pose.quaternion().vec().norm() <= last_digits && pose.origin().norm() <= last_digits * mass.centre().norm())
+    pose = Pose();
   grounded = on;
   grounded_mass = on ? mass.mass : 0.0;
   begin_to_rest();

@@ -53,6 +53,39 @@ TEST(FrozenContacts, turned_is_the_view_from_the_other_side_and_its_own_inverse)
   EXPECT_EQ(contacts.turned(other.data()), (History{3, 4}));
 }
 
+TEST(FrozenContacts, a_review_sees_new_contacts_and_those_that_the_last_one_kept) {
+  FrozenContacts contacts = with_layout({});
+  std::set<Pair> seen, wanted;
+  const auto review = [&] {
+    seen.clear();
+    contacts.review([&](std::int64_t low, std::int64_t high) {
+      EXPECT_TRUE(seen.emplace(low, high).second) << "a contact is reviewed twice";
+      return wanted.count({low, high}) != 0;
+    });
+    return seen;
+  };
+  contacts.add(1, 3, nullptr);  // nobody wants reviews
+  contacts.begin_reviews();
+  contacts.add(1, 2, nullptr);
+  contacts.add(3, 2, nullptr);
+  contacts.add(4, 2, nullptr);
+  contacts.add(2, 4, nullptr);
+  wanted = {{2, 3}};
+  EXPECT_EQ(review(), (std::set<Pair>{{1, 2}, {2, 3}, {2, 4}}));
+  contacts.add(5, 6, nullptr);
+  EXPECT_EQ(review(), (std::set<Pair>{{2, 3}, {5, 6}}));
+  contacts.erase(3);
+  EXPECT_TRUE(review().empty());
+  contacts.add(7, 8, nullptr);  // in the place of one that has gone
+  contacts.erase(7);
+  contacts.add(8, 9, nullptr);
+  EXPECT_EQ(review(), (std::set<Pair>{{8, 9}}));
+  contacts.fit();
+  EXPECT_TRUE(review().empty());
+  contacts.add(1, 9, nullptr);
+  EXPECT_EQ(review(), (std::set<Pair>{{1, 9}}));
+}
+
 TEST(FrozenContacts, each_contact_is_listed_once_as_its_low_tag_sees_it) {
   FrozenContacts contacts = with_layout({true});
   const double h[] = {2};

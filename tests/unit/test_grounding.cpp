@@ -131,6 +131,21 @@ TEST(Grounding, one_granule_that_spins_on_the_spot_may_go_on_and_its_frame_is_th
   EXPECT_NEAR(bed.body().twist.spin[2], 20, 1e-9);
 }
 
+TEST(Grounding, what_has_moved_by_the_last_digits_only_stands_in_the_worlds_frame) {
+  const auto pose_after = [](double angle, double way) {
+    Resting bed(on_ground());
+    bed.lock({1, 2, 3});
+    SolidBody& body = bed.parts.bed.solid.body(bed.parts.body_of(1));
+    const Eigen::Quaterniond turn(1, 0, 0.5 * angle, 0);
+    body.pose = Pose(Vec3(way, 0, 0), turn);
+    body.ground(true);
+    return body.pose;
+  };
+  EXPECT_EQ(pose_after(1e-16, 1e-18), Pose());
+  EXPECT_NE(pose_after(1e-12, 0), Pose());
+  EXPECT_NE(pose_after(0, 1e-12), Pose());
+}
+
 TEST(Grounding, a_body_is_let_go_when_its_walls_would_have_to_pull) {
   Resting bed(on_ground());
   bed.lock({1, 2, 3});
