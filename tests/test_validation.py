@@ -111,13 +111,22 @@ class Cases(Folder):
                     self.assertTrue(bed is None or bed[0].is_file(), bed)
 
 
-class Points(unittest.TestCase):
+class Points(Folder):
     def test_the_sweep(self):
         found = points.points()
         self.assertEqual(len({p.name for p in found}), len(found))
         self.assertEqual(points.runs_of(found[0]), 5)
         self.assertEqual({p.family for p in points.points(["depth 1"])}, set(points.FAMILIES))
         self.assertEqual([p.name for p in found if p.default], ["unculled", "sleep 3 0", "live 3 0"])
+
+    def test_on_more_ranks_the_defaults_alone_are_run(self):
+        case = cases.load(["drum"], "quick")[0]
+        beds = {(case.name, scene): None for scene in case.scenes}
+        of_one, of_four = (case_runs.jobs_of(case, self.folder, beds, "launcher", "fix", [], ranks) for ranks in (1, 4))
+        self.assertEqual({job.ranks for job in of_one}, {1})
+        self.assertEqual({job.ranks for job in of_four}, {4})
+        self.assertEqual({job.point.name for job in of_four}, {"unculled", "sleep 3 0", "live 3 0"})
+        self.assertGreater(len(of_one), len(of_four))
 
     def test_frozen_by_hand(self):
         text = "read_restart a\nfix integrate all nve/sphere\nrun 5\n"
@@ -387,7 +396,8 @@ class Publish(Folder):
         self.assertFalse((root / first_page.CASES).exists())
 
     def test_only_full_runs_of_all_cases_are_published(self):
-        for words in (["--publish"], ["--publish", "--full", "silo"], ["--publish", "--full", "--also", "calm 3"]):
+        for words in (["--publish"], ["--publish", "--full", "silo"], ["--publish", "--full", "--also", "calm 3"],
+                      ["--publish", "--full", "--ranks", "2"], ["--few-steps", "--ranks", "2"], ["--ranks", "0"]):
             with self.assertRaises(SystemExit), open(os.devnull, "w") as nowhere, contextlib.redirect_stderr(nowhere):
                 command.options(words)
         self.assertTrue(command.options(["--publish", "--full"]).publish)

@@ -33,11 +33,11 @@ def frozen_by_hand(text, region, where):
 class CaseJob(KeptJob):
     """One run of a case at a point. Its final dump has velocities and stresses too; with `frames`, snapshots on the way."""
 
-    def __init__(self, case, scene, point, k, out, variables, frames, launcher, made_with):
+    def __init__(self, case, scene, point, k, out, variables, frames, launcher, made_with, ranks=1):
         self.case, self.scene, self.point, self.k, self.frames = case, scene, point, k, frames
         kind = "unculled" if point.family in (UNCULLED, BY_HAND) else "culled"
         name = re.sub(r"[^\w.]+", "-", f"{scene} {point.name} {k + 1}".strip())
-        super().__init__(case.deck, out, kind, 0, variables, shifted=False, extra=self.measured, launcher=launcher,
+        super().__init__(case.deck, out, kind, 0, variables, ranks, shifted=False, extra=self.measured, launcher=launcher,
                          keywords=point.keywords or None, name=name, made_with=made_with)
 
     def measured(self, run):
@@ -133,8 +133,8 @@ def make_beds(cases, out, at_once, say):
     return files
 
 
-def jobs_of(case, out, beds, launcher, fix, also=()):
-    """All runs of a case, unculled and culled ones in turns. `also`: see points()."""
+def jobs_of(case, out, beds, launcher, fix, also=(), ranks=1):
+    """All runs of a case, unculled and culled ones in turns. `also`: see points(). On more ranks than one, those at the defaults."""
     jobs = []
     for scene in case.scenes:
         v = case.variables(scene)
@@ -143,7 +143,8 @@ def jobs_of(case, out, beds, launcher, fix, also=()):
         texts = [f.read_text() for f in sorted({*case.folder.glob("*.in"), *(case.folder.parent.parent / "shared").glob("*.in")} - {case.deck})]
         texts.append(bed.with_suffix(".recipe").read_text() if bed else "")
         main = scene == case.main_scene
-        wanted = [p for p in points(also) if (p.everywhere or main) and (p.family != BY_HAND or case.get("by_hand"))]
+        wanted = [p for p in points(also) if (p.everywhere or main) and (p.family != BY_HAND or case.get("by_hand")) and
+                  (ranks == 1 or p.everywhere)]
         for k in range(max(runs_of(p, main) for p in wanted)):
             for p in wanted:
                 if k >= runs_of(p, main):
@@ -151,7 +152,7 @@ def jobs_of(case, out, beds, launcher, fix, also=()):
                 frames = v.get("frames", FRAMES) if k == 0 and p.default and main else 0
                 aside = {case.need("aside"): ASIDE[k]}
                 made_with = "\n".join([*texts, fix if p.family not in (UNCULLED, BY_HAND) else ""])
-                jobs.append(CaseJob(case, scene, p, k, out / case.name / "runs", {**given, **aside}, frames, launcher, made_with))
+                jobs.append(CaseJob(case, scene, p, k, out / case.name / "runs", {**given, **aside}, frames, launcher, made_with, ranks))
     return jobs
 
 

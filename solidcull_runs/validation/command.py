@@ -1,4 +1,4 @@
-"""validation/run.sh [--quick|--full] [--report-only|--few-steps] [--publish] [--also KEYWORDS] [--at-once N] [CASE ...]
+"""validation/run.sh [--quick|--full] [--report-only|--few-steps] [--publish] [--also KEYWORDS] [--ranks N] [--at-once N] [CASE ...]
 
 Runs cases, unculled and culled, and writes the report. What was run before, with the same deck and the same fix, is not run again:
 after a kill the same command goes on. `--few-steps`: each deck once unculled and once culled, cut short; no report.
@@ -29,14 +29,19 @@ def options(argv):
     how.add_argument("--report-only", action="store_true", help="run nothing; write the report of the results that there are")
     how.add_argument("--few-steps", action="store_true", help="each deck for a few steps: that all of it still runs")
     p.add_argument("--also", action="append", default=[], metavar="KEYWORDS", help="a point more: these keywords of the fix; may be repeated")
-    p.add_argument("--at-once", type=int, default=cores(), metavar="N", help="runs at the same time (default: one a core)")
+    p.add_argument("--ranks", type=int, default=1, metavar="N", help="of each run; on more than one, the defaults alone beside unculled runs")
+    p.add_argument("--at-once", type=int, default=None, metavar="N", help="runs at the same time (default: one rank a core)")
     p.add_argument("--out", type=Path, default=HERE / "out", metavar="FOLDER", help="beds, logs and results")
     p.add_argument("--report", type=Path, default=None, metavar="FOLDER", help="default: validation/report/SIZE")
     p.add_argument("--publish", action="store_true", help="keep the report with the sources: validation/RESULTS.md, results.json, and the README's rows")
     p.set_defaults(size="quick")
     a = p.parse_args(argv)
-    if a.publish and (a.few_steps or a.case or a.also or a.size != "full"):
-        p.error("--publish takes all cases, --full, and neither --few-steps nor --also")
+    if a.publish and (a.few_steps or a.case or a.also or a.ranks != 1 or a.size != "full"):
+        p.error("--publish takes all cases, --full, and neither --few-steps nor --also nor --ranks")
+    if a.ranks < 1 or (a.few_steps and a.ranks != 1):
+        p.error("--ranks takes 1 or more, and not with --few-steps")
+    if a.at_once is None:
+        a.at_once = max(1, cores() // a.ranks)
     if a.at_once < 1:
         p.error("--at-once takes 1 or more")
     return a
@@ -70,7 +75,8 @@ def draw(case, done, file):
 
 
 def run(a):
-    out = a.out / a.size
+    size = a.size + (f"-{a.ranks}-ranks" if a.ranks > 1 else "")
+    out = a.out / size
     wanted = cases.load(a.case, a.size)
     failed = []
     if a.few_steps:
@@ -80,11 +86,11 @@ def run(a):
     if not a.report_only:
         launcher = engine.find_launcher()
         fix = engine.hash_of_fix(launcher)
-        beds = case_runs.make_beds(wanted, out, a.at_once, say)
+        beds = case_runs.make_beds(wanted, a.out / a.size, cores(), say)
         jobs = {}
         for case in wanted:
             try:
-                jobs[case] = case_runs.jobs_of(case, out, beds, launcher, fix, a.also)
+                jobs[case] = case_runs.jobs_of(case, out, beds, launcher, fix, a.also, a.ranks)
             except RunError as e:
                 failed.append(str(e))
         course = case_runs.Course([job for of_case in jobs.values() for job in of_case], a.at_once, say)
@@ -101,9 +107,9 @@ def run(a):
             results.append(case_results.read_result(file))
         elif a.report_only:
             say(f"{case.name} has no results; run it first")
-    folder = a.report or HERE / "report" / a.size
+    folder = a.report or HERE / "report" / size
     folder.parent.mkdir(parents=True, exist_ok=True)
-    page = report.write(results, folder, out, f"Made by `validation/run.sh --{a.size}`.")
+    page = report.write(results, folder, out, f"Made by `validation/run.sh --{a.size}{f' --ranks {a.ranks}' if a.ranks > 1 else ''}`.")
     say(f"report: {folder / 'README.md'} and {folder / 'report.html'}")
     if a.publish:
         report.publish(results, page, folder, HERE.parent)

@@ -47,6 +47,9 @@ Work of the rank with most over the mean of all ranks, in each step.
 LIGGGHTS's loop, medians of runs in turns.
 
 {times}
+Of the blade, which goes along x: beside ranks along x one has what lies before it, and what it has left behind sleeps. Along y each
+has half of what it moves.
+
 ## Up to 1,000 ranks
 
 ![A step of 1,000,000,000 granules against the number of ranks: the whole, its work dotted, and where it bends](model.png)
@@ -123,11 +126,11 @@ def median(values):
 
 def times(records):
     """Of LIGGGHTS's loop."""
-    head = ["scene", "granules", "runs", "LIGGGHTS, 1 rank", "2 ranks", "faster", "with the line, 1 rank", "2 ranks", "faster", "2 ranks, `balance`"]
+    head = ["scene", "ranks along", "granules", "runs", "LIGGGHTS, 1 rank", "2 ranks", "faster", "with the line, 1 rank", "2 ranks", "faster", "2 ranks, `balance`"]
     rows = []
     for r in of(records, "times"):
         t = {kind: median(values) for kind, values in r["seconds"].items()}
-        rows.append([r["scene"], f"{r['granules']:,}", r["runs"], *(cell for kind in ("unculled", "culled") for cell in (
+        rows.append([r["scene"], r["cut"], f"{r['granules']:,}", r["runs"], *(cell for kind in ("unculled", "culled") for cell in (
             f"{t[kind + ' 1']:.2f} s", f"{t[kind + ' 2']:.2f} s", f"{t[kind + ' 1'] / t[kind + ' 2']:.2f} times")), f"{t['balanced 2']:.2f} s"])
     return head, rows
 

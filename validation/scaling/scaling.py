@@ -27,7 +27,7 @@ GRIDS = {1: (1, 1), 2: (2, 1), 4: (2, 2), 8: (4, 2), 16: (4, 4)}  # ranks along 
 EVERY, ROWS, TIME_STEP = 25, 50, 3e-5  # steps between looks, between two dumps; s. As bed.in has them
 BALL_SPEED = 1.5                       # m/s
 SCENES = {"impact": 1, "blade": 2, "corner": 1}  # the tool, as bed.in calls it
-TIMED = "impact", "blade"
+TIMED = ("impact", "x"), ("blade", "x"), ("blade", "y")  # and along what more ranks lie
 MOVE_EVERY, MOVE_ABOVE, NEVER = 20, 1.1, 1000.0  # steps between moves of cuts; the threshold of `balance`, and one that is never met
 MOVED = re.compile(r"cuts between ranks moved (\d+) times; (?:so far|after the first time) the most loaded rank had (\S+) times the mean work on average, (\S+) at most")
 
@@ -55,14 +55,15 @@ class Case:
     way: str
     ranks: int
     effort: Effort
+    along: str = "x"               # more ranks lie along it
 
     @property
     def grid(self):
-        return GRIDS[self.ranks]
+        return GRIDS[self.ranks] if self.along == "x" else GRIDS[self.ranks][::-1]
 
     @property
     def name(self):
-        return f"{self.scene}-{self.way}-{self.ranks}"
+        return f"{self.scene}-{self.way}-{self.ranks}" + ("" if self.along == "x" else f"-{self.along}")
 
     def bed(self):
         many = self.way == "weak"
@@ -154,7 +155,7 @@ KINDS = ("unculled", 1), ("unculled", 2), ("culled", 1), ("culled", 2), ("balanc
 def timed_run(case, kind, k):
     """Seconds of LIGGGHTS's loop, and means of the counts."""
     effort = case.effort
-    folder, variables = place_of(Case(f"{case.scene}", f"{case.way}-timed", case.ranks, effort), effort)
+    folder, variables = place_of(Case(case.scene, f"{case.way}-timed", case.ranks, effort, case.along), effort)
     variables = {**variables, **case.variables(effort.timed), **{
         "culled": {}, "balanced": {"cull": f"fix cull all solid/cull every {EVERY} balance {MOVE_EVERY} {MOVE_ABOVE}"},
         "unculled": {"cull": "", "counts": "atoms atoms atoms"}}[kind]}
@@ -167,12 +168,13 @@ def time_record(case, runs):
         found = {kind: [] for kind in KINDS}
         for k in range(runs):
             for kind, ranks in KINDS:
-                found[kind, ranks].append(timed_run(Case(case.scene, case.way, ranks, case.effort), kind, k))
+                found[kind, ranks].append(timed_run(Case(case.scene, case.way, ranks, case.effort, case.along), kind, k))
         exterior, interface, interior = found["culled", 1][0]["counts"]
         return {"what": "times", "scene": case.scene, "granules": case.bed().granules, "steps": case.effort.timed, "runs": runs,
                 "exterior": exterior, "interface": interface, "interior": interior,
                 "seconds": {f"{kind} {ranks}": [round(run["seconds"], 4) for run in of] for (kind, ranks), of in found.items()}}
-    return kept(case.effort, f"times-{case.scene}", recipe_of(case, runs), make)
+    name = f"times-{case.scene}" + ("" if case.along == "x" else f"-{case.along}")
+    return {**kept(case.effort, name, recipe_of(case, runs), make), "cut": case.along}
 
 
 def share_record(cells, ranks, effort):
@@ -257,7 +259,8 @@ def main():
             cases = cases[1::2] if a.few_steps else cases
             records += [count_record(case) for case in cases]
         if "times" in a.only:
-            records += [time_record(Case(scene, "strong", 1, replace(effort, strong=effort.timed_bed)), runs) for scene in (["impact"] if a.few_steps else TIMED)]
+            records += [time_record(Case(scene, "strong", 1, replace(effort, strong=effort.timed_bed), along), runs)
+                        for scene, along in (TIMED[:1] if a.few_steps else TIMED)]
         if "balance" in a.only:
             records += [share_record(cells, n, effort) for cells in effort.beds for n in ranks if n > 1]
         check(records, effort)
