@@ -86,7 +86,7 @@ def run(a):
     if not a.report_only:
         launcher = engine.find_launcher()
         fix = engine.hash_of_fix(launcher)
-        beds = case_runs.make_beds(wanted, a.out / a.size, cores(), say)
+        beds = case_runs.make_beds(wanted, a.out / a.size, a.at_once * a.ranks, say)
         jobs = {}
         for case in wanted:
             try:
