@@ -198,6 +198,36 @@ TEST(Handover, what_lags_behind_by_less_than_the_slack_may_wait) {
   });
 }
 
+/// Each way alone is less than half the slack, a granule's diameter.
+TEST(Handover, what_merges_lags_behind_by_the_ways_of_both_bodies) {
+  run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
+    constexpr double d = 2 * r;
+    for (int n = 0; n < 3; ++n) w.add(31 + n, Vec3(-0.45 * d - apart * n, 0.05, 0), r);
+    Block block(w, -0.065);
+    WorldParts& parts = block.parts;
+    parts.lock({31, 32, 33});
+    parts.put_away({31});
+    parts.reneighbour();
+    const auto looks = [&] {
+      parts.bed.index.index(w.atoms);
+      return parts.handover.stored_elsewhere();
+    };
+    const auto shift = [&](int tag) {
+      if (const int body = parts.body_of(tag)) parts.bed.solid.body(body).shift(Vec3(0.3 * d, 0, 0));
+    };
+    looks();
+    shift(31);
+    EXPECT_TRUE(looks().empty());
+    if (parts.body_of(1) && parts.body_of(31)) parts.bed.solid.tie(1, 31, parts.bed.masses.by_tag());
+    parts.bed.adopt_places();
+    EXPECT_EQ(parts.body_of(1), parts.body_of(31));
+    EXPECT_TRUE(looks().empty());
+    shift(1);
+    const std::vector<std::int64_t> found = looks();
+    EXPECT_EQ(std::count(found.begin(), found.end(), 31), w.ranks.me == 0);
+  });
+}
+
 TEST(Handover, an_interface_granule_that_was_announced_and_does_not_come_has_left_its_body) {
   run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
     Block block(w, -0.06);
