@@ -13,22 +13,6 @@ namespace {
 constexpr int block_edge = 8;  // voxels
 constexpr int block_shift = 3;
 
-/// One bit per voxel of a block, set = void: word i, bit 8 j + k. This is also the layout of an OpenVDB leaf mask.
-using Mask = std::array<std::uint64_t, block_edge>;
-
-struct BlockKey {
-  std::int32_t i, j, k;
-  bool operator==(const BlockKey& o) const { return i == o.i && j == o.j && k == o.k; }
-};
-
-/// A block of the table. `state` is the index of its mask, or one of the marks; most blocks are all solid or all void.
-struct Block {
-  enum Mark : std::int32_t { solid = -1, all_void = -2, stale = -3, unused = -4 };
-  BlockKey key;
-  std::int32_t state = unused;
-  std::uint32_t touched = 0;  // the epoch in which it was touched last
-};
-
 /// Squared distance of x from the interval of voxel centres lo .. lo + 7 (voxel units).
 double squared_gap(double x, std::int32_t block) {
   const double lo = static_cast<double>(block) * block_edge, hi = lo + (block_edge - 1);
@@ -46,6 +30,22 @@ constexpr double rounding_margin = 1e-6;
 }  // namespace
 
 struct ImplicitSurface::Impl {
+  /// One bit per voxel of a block, set = void: word i, bit 8 j + k. This is also the layout of an OpenVDB leaf mask.
+  using Mask = std::array<std::uint64_t, block_edge>;
+
+  struct BlockKey {
+    std::int32_t i, j, k;
+    bool operator==(const BlockKey& o) const { return i == o.i && j == o.j && k == o.k; }
+  };
+
+  /// A block of the table. `state` is the index of its mask, or one of the marks; most blocks are all solid or all void.
+  struct Block {
+    enum Mark : std::int32_t { solid = -1, all_void = -2, stale = -3, unused = -4 };
+    BlockKey key;
+    std::int32_t state = unused;
+    std::uint32_t touched = 0;  // the epoch in which it was touched last
+  };
+
   double voxel, closing;
   Gather gather;
 
@@ -290,13 +290,13 @@ void ImplicitSurface::touch(const Sphere& s) {
   Impl& m = *impl_;
   const Vec3 c = s.centre / m.voxel;
   const double r = (s.radius + m.closing) / m.voxel + rounding_margin, r2 = r * r;
-  const BlockKey lo{first_block(c.x() - r), first_block(c.y() - r), first_block(c.z() - r)};
-  const BlockKey hi{last_block(c.x() + r), last_block(c.y() + r), last_block(c.z() + r)};
+  const Impl::BlockKey lo{first_block(c.x() - r), first_block(c.y() - r), first_block(c.z() - r)};
+  const Impl::BlockKey hi{last_block(c.x() + r), last_block(c.y() + r), last_block(c.z() + r)};
   for (std::int32_t i = lo.i; i <= hi.i; ++i)
     for (std::int32_t j = lo.j; j <= hi.j; ++j)
       for (std::int32_t k = lo.k; k <= hi.k; ++k) {
         if (squared_gap(c.x(), i) + squared_gap(c.y(), j) + squared_gap(c.z(), k) > r2) continue;
-        Block& b = m.entry({i, j, k});
+        Impl::Block& b = m.entry({i, j, k});
         m.forget(b);
         if (b.touched == m.epoch) continue;
         b.touched = m.epoch;
@@ -306,7 +306,7 @@ void ImplicitSurface::touch(const Sphere& s) {
 
 void ImplicitSurface::touch_all() {
   Impl& m = *impl_;
-  m.table.assign(1024, Block());
+  m.table.assign(1024, Impl::Block());
   m.used = m.held = 0;
   m.masks.clear();
   m.free_masks.clear();
@@ -341,18 +341,18 @@ bool ImplicitSurface::touched_near(const Vec3& p, double reach) const {
   if (m.touched.empty()) return false;
   const Vec3 c = p / m.voxel;
   const double r = reach / m.voxel + rounding_margin, r2 = r * r;
-  const auto near = [&](const BlockKey& b) {
+  const auto near = [&](const Impl::BlockKey& b) {
     return squared_gap(c.x(), b.i) + squared_gap(c.y(), b.j) + squared_gap(c.z(), b.k) <= r2;
   };
-  const BlockKey lo{first_block(c.x() - r), first_block(c.y() - r), first_block(c.z() - r)};
-  const BlockKey hi{last_block(c.x() + r), last_block(c.y() + r), last_block(c.z() + r)};
+  const Impl::BlockKey lo{first_block(c.x() - r), first_block(c.y() - r), first_block(c.z() - r)};
+  const Impl::BlockKey hi{last_block(c.x() + r), last_block(c.y() + r), last_block(c.z() + r)};
   const double box = (hi.i - lo.i + 1.0) * (hi.j - lo.j + 1.0) * (hi.k - lo.k + 1.0);
   if (box > static_cast<double>(m.touched.size())) return std::any_of(m.touched.begin(), m.touched.end(), near);
   for (std::int32_t i = lo.i; i <= hi.i; ++i)
     for (std::int32_t j = lo.j; j <= hi.j; ++j)
       for (std::int32_t k = lo.k; k <= hi.k; ++k) {
-        const Block& b = m.table[m.slot_of({i, j, k})];
-        if (b.state != Block::unused && b.touched == m.epoch && near(b.key)) return true;
+        const Impl::Block& b = m.table[m.slot_of({i, j, k})];
+        if (b.state != Impl::Block::unused && b.touched == m.epoch && near(b.key)) return true;
       }
   return false;
 }

@@ -24,7 +24,7 @@ elif [ $# -eq 0 ]; then
   mapfile -t files < <(find $folders -name '*.cpp' | sort)
 fi
 
-SOLIDCULL_PACKAGES="clang-tidy libbenchmark-dev" SOLIDCULL_BUILD=$root/build-tidy SOLIDCULL_CMAKE=-DSOLIDCULL_BENCHMARKS=ON \
+SOLIDCULL_PACKAGES="clang-tidy libbenchmark-dev" SOLIDCULL_BUILD=$root/build-tidy SOLIDCULL_CMAKE="-DSOLIDCULL_BENCHMARKS=ON -DCMAKE_UNITY_BUILD=OFF" \
   scripts/prepare.sh --configure
 # a header alone is read with the flags of a file beside it
 printf '%s\0' "${files[@]}" | xargs -0 -n 1 -P "${SOLIDCULL_JOBS:-$(nproc)}" clang-tidy -p build-tidy --quiet

@@ -70,6 +70,10 @@ PROJECT = f"""\
 cmake_minimum_required(VERSION 3.16)
 project(choice LANGUAGES CXX)
 include(GNUInstallDirs)
+find_package(MPI REQUIRED COMPONENTS CXX)
+# what was found holds for all configurations of this folder; CMake would compile two programs each time to see it again
+set(MPI_CXX_WORKS TRUE CACHE INTERNAL "")
+set(MPI_MPICXX_FOUND FALSE CACHE INTERNAL "")
 include("{ADAPTERS}/engine.cmake")
 get_target_property(flags liggghts INTERFACE_COMPILE_DEFINITIONS)
 get_target_property(libraries liggghts INTERFACE_LINK_LIBRARIES)

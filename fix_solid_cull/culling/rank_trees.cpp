@@ -6,18 +6,12 @@
 
 namespace solidcull {
 
-namespace {
-
-/// Who a row is for and of whom, by their numbers on their ranks.
-struct Address {
-  int to, from;
-};
-
-}  // namespace
-
 /// What a part tells another one that it is tied to.
 struct RankTrees::Note {
-  Address address;
+  /// Who a row is for and of whom, by their numbers on their ranks.
+  struct Address {
+    int to, from;
+  } address;
   std::int64_t key;
   int level;
   Neighbour parent;
@@ -136,7 +130,7 @@ void RankTrees::grow(const std::map<int, std::vector<PartLink>>& links, const Ve
 }
 
 void RankTrees::send(std::size_t part, const Neighbour& to, const void* row, std::size_t bytes) const {
-  const Address address{to.body, parts_[part].body};
+  const Note::Address address{to.body, parts_[part].body};
   std::vector<char> message(sizeof address + bytes);
   std::memcpy(message.data(), &address, sizeof address);
   std::memcpy(message.data() + sizeof address, row, bytes);
@@ -154,14 +148,14 @@ void RankTrees::receive(std::size_t part, const Neighbour& from, void* row, std:
   }
   while (message.empty()) {
     message = ranks_.receive(from.rank);
-    Address address;
+    Note::Address address;
     if (message.size() != sizeof address + bytes) throw InternalError("a row of a body over ranks has a wrong size");
     std::memcpy(&address, message.data(), sizeof address);
     if (address.to == wanted[1] && address.from == wanted[2]) break;
     early_[{from.rank, address.to, address.from}] = std::move(message);
     message.clear();
   }
-  std::memcpy(row, message.data() + sizeof(Address), bytes);
+  std::memcpy(row, message.data() + sizeof(Note::Address), bytes);
 }
 
 }  // namespace solidcull

@@ -16,7 +16,7 @@ constexpr std::size_t most_reasons = 2;
 constexpr double limits = 1.0 / 3;
 constexpr double most_of_what_woke = 2.0 / 3;
 // so few are exterior that advice is none, or the run too short for one
-constexpr double worth_advice = 0.02, fewest_steps = 100;
+constexpr double worth_advice = 0.02, steps_for_advice = 100;
 constexpr double about_as_long = 0.05;
 
 std::string format(const char* how, ...) __attribute__((format(printf, 1, 2)));
@@ -96,7 +96,7 @@ std::string text_of(const RunSummary& run, const Settings& settings) {
 
 std::string advice_on(const RunWork& w, const Settings& settings) {
   const double awake = w.awake.all();
-  if (w.steps < fewest_steps || w.exterior < worth_advice * w.all() || awake == 0) return "";
+  if (w.steps < steps_for_advice || w.exterior < worth_advice * w.all() || awake == 0) return "";
   struct Limit {
     double steps;  // of granules that it keeps awake
     std::string keyword;

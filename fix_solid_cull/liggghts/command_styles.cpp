@@ -13,7 +13,7 @@ namespace {
 constexpr Sight nothing = Sight::nothing, run = Sight::run, state = Sight::state, whole_bed = Sight::whole_bed,
                 all_restored = Sight::all_restored;
 
-constexpr CommandStyle styles[] = {
+constexpr CommandStyle command_styles[] = {
     {"angle_*", nothing},
     {"atom_*", nothing},
     {"bond_*", nothing},
@@ -131,7 +131,7 @@ Sight sight_of(const std::string& command, const std::vector<std::string>& words
   if (command == "write_restart" && words.size() > 1 && words[1] == "region") return all_restored;  // some granules only
   if (command == "fix" && words.size() > 2 && fix_reads_granules(words[2])) return whole_bed;
   if (command == "compute" && words.size() > 2 && compute_reads_granules(words[2])) return whole_bed;
-  const CommandStyle& found = row_of(command, styles, not_known);
+  const CommandStyle& found = row_of(command, command_styles, not_known);
   return *found.name == 0 && !engine_has_it ? nothing : found.sight;
 }
 

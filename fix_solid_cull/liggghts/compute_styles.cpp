@@ -12,7 +12,7 @@ constexpr const char* no_clumps = "multisphere clumps are not supported yet";
 constexpr const char* no_single_pairs = "LIGGGHTS's granular contacts do not support it";
 constexpr const char* of_molecules = "adds up whole molecules, and culled granules would be left out";
 
-constexpr ComputeStyle styles[] = {
+constexpr ComputeStyle compute_styles[] = {
     {"pe", exact, ""},       // granular contacts have no potential energy in LIGGGHTS: 0
     {"pe/atom", exact, ""},  // likewise
     {"slice", exact, ""},
@@ -61,10 +61,10 @@ constexpr ComputeStyle styles[] = {
     {"reduce/sph", refused, "SPH would miss the culled granules"},
     {"rigid", refused, "rigid clumps of granules are not supported yet"},
 };
-constexpr ComputeStyle unknown = {"", atoms_only, ""};
+constexpr ComputeStyle unknown_compute = {"", atoms_only, ""};
 
 }  // namespace
 
-const ComputeStyle& measure_of(const std::string& style) { return row_of(style, styles, unknown); }
+const ComputeStyle& measure_of(const std::string& style) { return row_of(style, compute_styles, unknown_compute); }
 
 }  // namespace solidcull

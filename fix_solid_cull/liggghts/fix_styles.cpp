@@ -18,7 +18,7 @@ constexpr const char* no_sph = "SPH would miss the culled granules";
 constexpr const char* no_heat = "heat conduction would miss the culled granules";
 constexpr const char* box_changes = "it changes the size of the box, and a culled bed cannot follow";
 
-constexpr FixStyle styles[] = {
+constexpr FixStyle fix_styles[] = {
     // LIGGGHTS's own helpers
     {"MINIMIZE", exact, ""},
     {"READ_RESTART", exact, ""},
@@ -111,10 +111,10 @@ constexpr FixStyle styles[] = {
     {"wall/region/sph", refused, no_sph},
     {"wall/sph", refused, no_sph},
 };
-constexpr FixStyle unknown = {"", drives, "is no fix of LIGGGHTS's own that solid/cull knows"};
+constexpr FixStyle unknown_fix = {"", drives, "is no fix of LIGGGHTS's own that solid/cull knows"};
 
 }  // namespace
 
-const FixStyle& treatment_of(const std::string& style) { return row_of(style, styles, unknown); }
+const FixStyle& treatment_of(const std::string& style) { return row_of(style, fix_styles, unknown_fix); }
 
 }  // namespace solidcull

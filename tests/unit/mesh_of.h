@@ -8,6 +8,17 @@
 
 namespace solidcull {
 
+constexpr double voxel = 1e-3;  // m
+
+/// A lattice of n^3 touching granules of diameter d, its first centre at `corner`.
+inline std::vector<Sphere> lattice(int n, double d, const Vec3& corner = Vec3::Zero()) {
+  std::vector<Sphere> spheres;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+      for (int k = 0; k < n; ++k) spheres.push_back({corner + d * Vec3(i, j, k), d / 2});
+  return spheres;
+}
+
 inline InterfaceMesh::Gather granules_of(const std::vector<Sphere>& granules) {
   return [&granules](const Vec3& lo, const Vec3& hi, const std::function<void(const Sphere&)>& visit) {
     for (const Sphere& s : granules)

@@ -22,6 +22,9 @@
 
 namespace solidcull {
 
+constexpr double r = 0.005;                                       // m, of most granules in the tests
+constexpr double apart = 0.999 * 2 * r, pressed = 0.998 * 2 * r;  // m, two that touch
+
 class SmallWorld;
 
 /// Where ranks meet. A rank that waits for one that does not come, or that has called something else, gets an exception: a

@@ -8,9 +8,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
-constexpr double apart = 0.999 * 2 * r;
-
 SmallDeck ranks_along_x(int ranks, double length = 0.12) {
   SmallDeck deck;
   deck.gravity = Vec3::Zero();

@@ -19,21 +19,21 @@ using Tags = std::set<std::int64_t>;
 
 /// A compact store with the graph and the bodies that ask it, and all that it holds kept beside it: granules that go in and out
 /// as the fix has them do it.
-struct Packing {
+struct StoreOfPacking {
   SolidBodies bodies;
   FrozenContacts contacts;
   GranuleStore store;
   std::map<std::int64_t, StoredGranule> granules;  // stored or not
   Vec3 periods = Vec3::Zero();
 
-  explicit Packing(double cell) : store(cell, GranuleStore::Precision::rounded) {
+  explicit StoreOfPacking(double cell) : store(cell, GranuleStore::Precision::rounded) {
     contacts.set_layout(std::vector<bool>(6, true));
     contacts.set_elsewhere([this](std::int64_t tag, std::vector<std::int64_t>& partners) {
       contacts_in_store(store, bodies, tag, SolidStateLaw::gap, partners);
     });
     bodies.set_elsewhere([this](std::int64_t tag) { return store.body_of(tag); });
   }
-  Packing(const Packing&) = delete;
+  StoreOfPacking(const StoreOfPacking&) = delete;
 
   void set_periods(const Vec3& p) { bodies.set_periods(periods = p); }
   bool touch(const StoredGranule& a, const StoredGranule& b) const {
@@ -97,7 +97,7 @@ StoredGranule granule(std::int64_t tag, int body, const Vec3& position, double r
 }
 
 /// n^3 granules of diameter 1 at random, as dense as a bed, in a cube.
-void fill(Packing& p, int n, int bodies, unsigned seed) {
+void fill(StoreOfPacking& p, int n, int bodies, unsigned seed) {
   std::mt19937 random(seed);
   const double edge = n * std::cbrt(0.5236 / 0.6);
   std::uniform_real_distribution<double> at(0, edge), size(0.35, 0.5);
@@ -111,7 +111,7 @@ void fill(Packing& p, int n, int bodies, unsigned seed) {
 
 TEST(ContactsInStore, the_graph_is_the_same_wherever_its_granules_are) {
   for (const int bodies : {1, 3}) {
-    Packing p(2.0);
+    StoreOfPacking p(2.0);
     fill(p, 7, bodies, 1);
     p.expect_right_graph();
     std::mt19937 random(2);
@@ -128,7 +128,7 @@ TEST(ContactsInStore, the_graph_is_the_same_wherever_its_granules_are) {
 }
 
 TEST(ContactsInStore, bodies_that_share_a_frame_are_told_apart) {
-  Packing p(2.0);
+  StoreOfPacking p(2.0);
   fill(p, 6, 2, 3);
   p.store.share(1, true);
   p.store.share(2, true);
@@ -137,7 +137,7 @@ TEST(ContactsInStore, bodies_that_share_a_frame_are_told_apart) {
 }
 
 TEST(ContactsInStore, what_comes_back_touches_its_neighbours_without_history_and_atoms_keep_theirs) {
-  Packing p(2.0);
+  StoreOfPacking p(2.0);
   p.bodies.found(SolidBody());
   for (int tag = 1; tag <= 4; ++tag) p.lock(granule(tag, 1, Vec3(tag, 0, 0), 0.5));
   p.tie_all();
@@ -157,7 +157,7 @@ TEST(ContactsInStore, what_comes_back_touches_its_neighbours_without_history_and
 }
 
 TEST(ContactsInStore, touching_is_within_the_gap_of_solid_state) {
-  Packing p(2.0);
+  StoreOfPacking p(2.0);
   p.bodies.found(SolidBody());
   p.lock(granule(1, 1, Vec3::Zero(), 0.5));
   p.lock(granule(2, 1, Vec3(1 + 0.99 * SolidStateLaw::gap, 0, 0), 0.5));
@@ -170,7 +170,7 @@ TEST(ContactsInStore, touching_is_within_the_gap_of_solid_state) {
 TEST(ContactsInStore, a_body_touches_itself_through_periodic_sides_however_it_was_put_together) {
   // a row of 10 around a box of 10, and a second one beside it whose places begin two periods further on; the frame is turned
   for (const double angle : {0.0, 0.7}) {
-    Packing p(2.0);
+    StoreOfPacking p(2.0);
     p.set_periods(Vec3(10, 0, 0));
     SolidBody body;
     body.pose = Pose(Vec3(3, 4, 5), Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vec3(1, 2, 3).normalized())));
@@ -186,7 +186,7 @@ TEST(ContactsInStore, a_body_touches_itself_through_periodic_sides_however_it_wa
 }
 
 TEST(ContactsInStore, bodies_that_meet_are_one_at_once) {
-  Packing p(2.0);
+  StoreOfPacking p(2.0);
   const auto mass_of = [&](std::int64_t tag) {
     return GranuleMass{p.granules.at(tag).mass, p.granules.at(tag).position, p.granules.at(tag).radius};
   };
@@ -209,7 +209,7 @@ TEST(ContactsInStore, bodies_that_meet_are_one_at_once) {
 
 TEST(ContactsInStore, a_body_comes_apart_where_what_was_stored_goes) {
   // a bar of 3 x 3 x 20 with its middle layer taken out
-  Packing p(2.0);
+  StoreOfPacking p(2.0);
   SolidBody body;
   for (int k = 0; k < 180; ++k) body.mass.add(1, Vec3(k / 9, k / 3 % 3, k % 3), 0.5);
   p.bodies.found(body);
@@ -245,7 +245,7 @@ TEST(ContactsInStore, a_body_comes_apart_where_what_was_stored_goes) {
 
 TEST(ContactsInStore, a_granule_of_a_few_kinds_takes_no_more_than_68_bytes_in_all) {
   // 27,000, locked and tied all at once, of two sizes, with 2.2 histories each; every tenth has its own change of load
-  Packing p(2.0);
+  StoreOfPacking p(2.0);
   PackedHistory packed;
   packed.set_layout(6, {0, 3});
   p.bodies.found(SolidBody());

@@ -10,9 +10,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
-constexpr double apart = 0.999 * 2 * r;
-
 /// A cube of n x n x n granules in `exterior live` with a cover of two diameters.
 struct Cube {
   static constexpr int n = 7;

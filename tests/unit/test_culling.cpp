@@ -10,7 +10,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
 // f_ID[1..12], from 0
 enum Value {
   exterior,

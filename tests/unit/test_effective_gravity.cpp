@@ -7,7 +7,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
 const double degree = std::acos(-1.0) / 180;
 
 /// A block of n x n x n granules that is one body.

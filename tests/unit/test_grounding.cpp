@@ -7,8 +7,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
-
 /// Granules side by side on a floor or ground, each in balance, tied together as one body.
 struct Resting {
   explicit Resting(const SmallDeck& deck, int granules = 3) : world(deck), parts(world, sleeping_settings(), 2 * r) {

@@ -16,9 +16,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
-constexpr double apart = 0.998 * 2 * r;
-
 SmallDeck ranks_along_x(int ranks) {
   SmallDeck deck;
   deck.gravity = Vec3::Zero();
@@ -118,7 +115,7 @@ void expect_alike(const Whole& a, const Whole& b) {
 struct Block {
   Block(SmallWorld& w, double from) : world(w), parts(w, sleeping_settings(), 2 * r) {
     for (int n = 0; n < 24; ++n) {
-      const Vec3 x = Vec3(from, 0, 0) + apart * Vec3(n % 6, n / 6 % 2, n / 12);
+      const Vec3 x = Vec3(from, 0, 0) + pressed * Vec3(n % 6, n / 6 % 2, n / 12);
       world.add(n + 1, x, r, Vec3(0.1, 0, 1e-4 * n), Vec3(0, 0, 1e-2));
       tags.push_back(n + 1);
     }
@@ -202,7 +199,7 @@ TEST(Handover, what_lags_behind_by_less_than_the_slack_may_wait) {
 TEST(Handover, what_merges_lags_behind_by_the_ways_of_both_bodies) {
   run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
     constexpr double d = 2 * r;
-    for (int n = 0; n < 3; ++n) w.add(31 + n, Vec3(-0.45 * d - apart * n, 0.05, 0), r);
+    for (int n = 0; n < 3; ++n) w.add(31 + n, Vec3(-0.45 * d - pressed * n, 0.05, 0), r);
     Block block(w, -0.065);
     WorldParts& parts = block.parts;
     parts.lock({31, 32, 33});
@@ -402,7 +399,7 @@ struct Slab {
     std::vector<std::int64_t> tags, stored;
     for (int n = 0; n < 792; ++n) {
       const int tag = 1 + 5 * n % 792;  // no order in space
-      w.add(tag, Vec3(-0.11, -0.03, -0.03) + apart * Vec3(n % 22, n / 22 % 6, n / 132), r, Vec3(0.01, 0, 1e-4 * (n % 22)),
+      w.add(tag, Vec3(-0.11, -0.03, -0.03) + pressed * Vec3(n % 22, n / 22 % 6, n / 132), r, Vec3(0.01, 0, 1e-4 * (n % 22)),
             Vec3(0, 0, 1e-2));
       tags.push_back(tag);
       if (tag % 5 != 0) stored.push_back(tag);
@@ -579,7 +576,9 @@ TEST(Handover, contacts_that_join_bodies_of_one_rank_are_no_matter_of_the_next) 
     }
     parts.change({}, proposal);
     EXPECT_EQ(parts.bed.solid.contacts().contains(1, 2), w.ranks.me == 0);
-    if (w.ranks.me == 0) EXPECT_EQ(parts.body_of(1), parts.body_of(2));
+    if (w.ranks.me == 0) {
+      EXPECT_EQ(parts.body_of(1), parts.body_of(2));
+    }
   });
 }
 

@@ -7,11 +7,11 @@
 #include <tuple>
 
 #include "implicit_surface.h"
+#include "mesh_of.h"
 
 namespace solidcull {
 namespace {
 
-constexpr double voxel = 1e-3;                   // m
 const double diagonal = std::sqrt(3.0) * voxel;  // the void voxel nearest to a point may lie this much behind the nearest void
 
 /// Spheres that a test may change while a surface looks at them.
@@ -33,7 +33,7 @@ struct Bed {
   }
 };
 
-Bed lattice(int n, double d) {
+Bed bed_on_lattice(int n, double d) {
   Bed bed;
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j)
@@ -106,7 +106,7 @@ TEST(ImplicitSurface, finds_the_nearest_void_voxel) {
 TEST(ImplicitSurface, depth_in_a_lattice_is_the_distance_to_its_faces) {
   const double d = 2 * voxel, closing = d;
   const int n = 14;
-  const Bed bed = lattice(n, d);
+  const Bed bed = bed_on_lattice(n, d);
   ImplicitSurface surface = bed.surface(closing);
   for (const Sphere& s : bed.spheres) {
     // The faces are the planes that touch the outermost granules; between those the closed surface sinks in by the sagitta of the
@@ -124,7 +124,7 @@ TEST(ImplicitSurface, depth_in_a_lattice_is_the_distance_to_its_faces) {
 
 TEST(ImplicitSurface, pores_are_no_void) {
   const double d = 2 * voxel;
-  const Bed bed = lattice(10, d);
+  const Bed bed = bed_on_lattice(10, d);
   const Vec3 pore = 0.5 * (bed.spheres[444].centre + bed.spheres[555].centre);
   ASSERT_TRUE(bed.is_void(pore, 0.0));
   ImplicitSurface open = bed.surface(0.0), closed = bed.surface(0.5 * d);
@@ -134,7 +134,7 @@ TEST(ImplicitSurface, pores_are_no_void) {
 
 TEST(ImplicitSurface, a_cavity_wider_than_closing_is_a_surface_too) {
   const double d = 2 * voxel, closing = 0.6 * d;
-  Bed bed = lattice(21, d);
+  Bed bed = bed_on_lattice(21, d);
   const Vec3 middle = bed.spheres[(21 * 21 * 21) / 2].centre;
   const double hole = 3 * d;
   Bed hollow;

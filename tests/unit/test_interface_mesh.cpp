@@ -13,7 +13,6 @@ namespace solidcull {
 namespace {
 
 constexpr double pi = 3.14159265358979323846;
-constexpr double voxel = 1e-3;  // m
 
 double ball_volume(double radius) { return 4.0 / 3.0 * pi * radius * radius * radius; }
 
@@ -46,15 +45,6 @@ Topology topology_of(const TriangleMesh& mesh) {
   topology.euler =
       static_cast<int>(mesh.vertices.size()) - static_cast<int>(half_edges.size() / 2) + static_cast<int>(mesh.triangles.size());
   return topology;
-}
-
-/// A lattice of n^3 touching granules of diameter d, its first centre at `corner`.
-std::vector<Sphere> lattice(int n, double d, const Vec3& corner = Vec3::Zero()) {
-  std::vector<Sphere> spheres;
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j)
-      for (int k = 0; k < n; ++k) spheres.push_back({corner + d * Vec3(i, j, k), d / 2});
-  return spheres;
 }
 
 /// Points on a fixed pattern around a body, where two meshes are compared.

@@ -5,8 +5,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
-
 /// Two rows of four, each a body; of the first the inner two are stored.
 struct TwoBodies {
   explicit TwoBodies(const Vec3& velocity = Vec3::Zero()) : world(empty_space()), parts(world, sleeping_settings(), 2 * r) {

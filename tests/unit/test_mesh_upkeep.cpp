@@ -12,7 +12,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double voxel = 1e-3, d = 2 * voxel, closing = 0.6 * d;  // as the fix has them (m)
+constexpr double d = 2 * voxel, closing = 0.6 * d;  // as the fix has them (m)
 
 /// A loose packing: granules of a lattice, shaken, of different sizes.
 std::vector<Sphere> packing(int n, unsigned seed) {

@@ -12,7 +12,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
 constexpr double inf = std::numeric_limits<double>::infinity();
 const double nan = std::nan("");
 

@@ -25,8 +25,6 @@ using Eigen::AngleAxisd;
 using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 
-constexpr double voxel = 1e-3;  // m
-
 class Random {
  public:
   explicit Random(unsigned seed) : engine_(seed) {}
@@ -158,14 +156,6 @@ TEST(Pose, the_box_around_a_turned_box_holds_it_and_no_more) {
 }
 
 // ------------------------------------------------------------------------------------------------- interface meshes in flight
-
-std::vector<Sphere> lattice(int n, double d, const Vec3& corner = Vec3::Zero()) {
-  std::vector<Sphere> spheres;
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j)
-      for (int k = 0; k < n; ++k) spheres.push_back({corner + d * Vec3(i, j, k), d / 2});
-  return spheres;
-}
 
 const Pose flown(Vec3(0.31, -0.24, 0.52), Quaterniond(AngleAxisd(1.1, Vec3(1, 2, 3).normalized())));
 

@@ -10,8 +10,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
-constexpr double apart = 0.998 * 2 * r;
 constexpr int edge = 6;
 
 Settings refilling(bool on = true) {
@@ -25,7 +23,7 @@ struct Cube {
   explicit Cube(const Settings& settings, const SmallDeck& deck = empty_space()) : world(deck), parts(world, settings, 2 * r) {
     std::vector<std::int64_t> tags;
     for (int n = 0; n < edge * edge * edge; ++n) {
-      world.add(n + 1, apart * Vec3(n % edge, n / edge % edge, n / edge / edge), r);
+      world.add(n + 1, pressed * Vec3(n % edge, n / edge % edge, n / edge / edge), r);
       tags.push_back(n + 1);
     }
     world.reneighbour();

@@ -5,15 +5,15 @@
 namespace solidcull {
 namespace {
 
-constexpr double steps = 8000;
+constexpr double steps_told = 8000;
 
 RunSummary impact() {
   RunSummary run;
   RunWork& w = run.work;
-  w.steps = steps;
-  w.exterior = steps * 2100;
-  w.interface = steps * 1500;
-  w.interior = steps * 16400;
+  w.steps = steps_told;
+  w.exterior = steps_told * 2100;
+  w.interface = steps_told * 1500;
+  w.interior = steps_told * 16400;
   w.seconds = 11.6;
   w.in_fix = 1.2;
   w.awake[Awake::moving] = 0.62 * w.exterior;

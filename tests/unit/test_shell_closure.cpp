@@ -8,7 +8,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
 using Tags = std::set<std::int64_t>;
 
 /// Ten granules along x that are one body.

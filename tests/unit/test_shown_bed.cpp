@@ -7,8 +7,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
-
 /// Twelve granules on a floor, tag 1 below, asleep: most are stored.
 struct AsleepColumn {
   explicit AsleepColumn(SmallWorld& w) : world(w), culling(w.ports(), sleeping_settings(), 1) {
@@ -53,7 +51,9 @@ TEST(ShownBed, shows_every_granule_once_and_takes_back_what_was_not_touched) {
     ASSERT_GE(world.at(tag), 0) << tag;
     places[tag] = world.atoms.place(world.at(tag));
     const double pressed = (13 - tag) * 9.81 * world.mass_of(r) / world.deck.stiffness;  // by what lies above
-    if (tag > 1) EXPECT_NEAR(places[tag][2] - places[tag - 1][2], 2 * r - pressed, 1e-6) << tag;
+    if (tag > 1) {
+      EXPECT_NEAR(places[tag][2] - places[tag - 1][2], 2 * r - pressed, 1e-6) << tag;
+    }
     EXPECT_EQ(world.atoms.colour[static_cast<std::size_t>(world.at(tag))], 0.1 * tag);
   }
   EXPECT_EQ(column.interior(), interior) << "what is shown is still culled";

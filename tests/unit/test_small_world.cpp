@@ -9,8 +9,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
-
 TEST(SmallWorld, a_granule_falls_as_galilei_says) {
   SmallWorld world{SmallDeck()};
   world.add(1, Vec3::Zero(), r);

@@ -10,7 +10,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double reach_factor = 1.1, skin = 0.05, edge = 0.17;  // of a bin
+constexpr double reach_factor = 1.1, skin = 0.05, bin_edge = 0.17;  // of a bin
 constexpr int across = 12;
 
 /// Spheres in the middle of a grid, two bins from its sides.
@@ -21,12 +21,12 @@ struct Cloud {
 
   Cloud(int n, unsigned seed) {
     std::mt19937 random(seed);
-    std::uniform_real_distribution<double> place(2 * edge, (across - 2) * edge), radius(0.1, 0.13);
+    std::uniform_real_distribution<double> place(2 * bin_edge, (across - 2) * bin_edge), radius(0.1, 0.13);
     for (int i = 0; i < n; ++i) {
       int b = 0;
       for (int d = 0; d < 3; ++d) {
         coordinates.push_back(place(random));
-        b = across * b + static_cast<int>(coordinates.back() / edge);
+        b = across * b + static_cast<int>(coordinates.back() / bin_edge);
       }
       radii.push_back(radius(random));
       bin.push_back(b);

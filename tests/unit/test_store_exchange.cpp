@@ -8,8 +8,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
-
 /// What is true of a granule that is an atom.
 struct State {
   Vec3 place, velocity, spin;

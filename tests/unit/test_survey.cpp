@@ -9,12 +9,11 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
 constexpr int looks_to_calm = 4;
 
 /// Granules in a row, and looks at them 16 steps apart. Forces are what a test says they are.
-struct Bed {
-  explicit Bed(const Settings& settings = sleeping_settings(), const SmallDeck& deck = SmallDeck())
+struct SurveyedBed {
+  explicit SurveyedBed(const Settings& settings = sleeping_settings(), const SmallDeck& deck = SmallDeck())
       : world(deck), parts(world, settings, 2 * r) {
     every = parts.bed.scales.look_every();
     speed = parts.bed.scales.solid_state().speed;
@@ -56,7 +55,7 @@ struct Bed {
 using Tags = std::set<std::int64_t>;
 
 TEST(Survey, a_granule_at_rest_is_chosen_when_it_has_been_calm_for_so_many_looks) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 3, Vec3::Zero());
   bed.begin();
   for (int n = 1; n < looks_to_calm; ++n) {
@@ -68,7 +67,7 @@ TEST(Survey, a_granule_at_rest_is_chosen_when_it_has_been_calm_for_so_many_looks
 }
 
 TEST(Survey, a_granule_that_a_fix_moves_on_a_way_of_its_own_is_not_chosen_before_it_is_released) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 3, Vec3::Zero());
   bed.begin();
   std::vector<double> until(3 * static_cast<std::size_t>(bed.world.atoms.owned), 0.0);  // in the second of three columns
@@ -82,7 +81,7 @@ TEST(Survey, a_granule_that_a_fix_moves_on_a_way_of_its_own_is_not_chosen_before
 }
 
 TEST(Survey, motion_against_a_neighbour_starts_the_count_anew) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 4, Vec3::Zero());
   bed.begin();
   bed.look();
@@ -99,8 +98,8 @@ TEST(Survey, motion_against_a_neighbour_starts_the_count_anew) {
 }
 
 TEST(Survey, surfaces_that_slide_are_no_rest_but_wheels_that_roll_on_each_other_are) {
-  Bed slides, rolls;
-  for (Bed* bed : {&slides, &rolls}) {
+  SurveyedBed slides, rolls;
+  for (SurveyedBed* bed : {&slides, &rolls}) {
     bed->row(1, 2, Vec3::Zero());
     bed->begin();
     const Vec3 spin(0, 0, 2 * bed->speed / r);
@@ -113,7 +112,7 @@ TEST(Survey, surfaces_that_slide_are_no_rest_but_wheels_that_roll_on_each_other_
 }
 
 TEST(Survey, a_granule_that_touches_nothing_is_no_solid) {
-  Bed bed;
+  SurveyedBed bed;
   bed.world.add(1, Vec3::Zero(), r);
   bed.world.add(2, Vec3(2.05 * r, 0, 0), r);  // within the skin, but not touching
   bed.begin();
@@ -121,7 +120,7 @@ TEST(Survey, a_granule_that_touches_nothing_is_no_solid) {
 }
 
 TEST(Survey, a_granule_out_of_balance_is_no_solid) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 3, Vec3::Zero());
   bed.begin();
   // a quarter of the wake-up tolerance of three weights
@@ -132,7 +131,7 @@ TEST(Survey, a_granule_out_of_balance_is_no_solid) {
 }
 
 TEST(Survey, what_something_holds_or_nothing_moves_is_never_chosen) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 4, Vec3::Zero());
   bed.begin();
   bed.world.atoms.groups[bed.world.at(1)] |= SmallAtoms::held_group;
@@ -144,7 +143,7 @@ TEST(Survey, what_something_holds_or_nothing_moves_is_never_chosen) {
 // ------------------------------------------------------------------------------------------------------------ frames
 
 TEST(Survey, a_mass_that_falls_freely_is_solid) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 3, Vec3::Zero());
   bed.begin();
   const Vec3 g = bed.world.deck.gravity;
@@ -162,7 +161,7 @@ TEST(Survey, a_mass_that_falls_freely_is_solid) {
 }
 
 TEST(Survey, a_mass_that_turns_as_one_is_solid) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 5, Vec3::Zero());
   bed.begin();
   const Vec3 spin(0, 0, 2);  // rad/s
@@ -184,7 +183,7 @@ TEST(Survey, a_mass_that_turns_as_one_is_solid) {
 }
 
 TEST(Survey, a_mass_that_is_struck_as_a_whole_begins_anew) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 3, Vec3::Zero());
   bed.begin();
   bed.look();
@@ -196,8 +195,8 @@ TEST(Survey, a_mass_that_is_struck_as_a_whole_begins_anew) {
 
 // ------------------------------------------------------------------------------------------------------------ walls
 
-struct OnGround : Bed {
-  OnGround() : Bed(sleeping_settings(), deck()) {
+struct OnGround : SurveyedBed {
+  OnGround() : SurveyedBed(sleeping_settings(), deck()) {
     world.add(1, Vec3(0, 0, r - weight() / world.deck.stiffness), r);
     begin();
   }
@@ -225,7 +224,7 @@ TEST(Survey, a_granule_alone_on_a_wall_that_stands_still_is_solid_unless_it_slid
 // ------------------------------------------------------------------------------------------------------------ loads
 
 TEST(Survey, who_is_hardly_pressed_must_be_calm_for_longer) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 2, Vec3::Zero(), 5.0);             // 5 weights: confined
   bed.row(3, 2, Vec3(0, 0.05, 0), 3.0 / 1.96);  // (3 / 1.53)^(1/2) = 1.4 times as long: 5.6 looks
   bed.row(5, 2, Vec3(0, 0.1, 0), 0.1);          // twice at most
@@ -239,7 +238,7 @@ TEST(Survey, who_is_hardly_pressed_must_be_calm_for_longer) {
 }
 
 TEST(Survey, who_woke_and_stands_where_it_stood_must_be_calm_for_half_as_long) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 2, Vec3::Zero());           // has never been culled
   bed.row(3, 2, Vec3(0, 0.05, 0));       // woke and stands
   bed.row(5, 2, Vec3(0, 0.1, 0));        // woke and has moved since, by 0.4 % of d
@@ -259,7 +258,7 @@ TEST(Survey, who_woke_and_stands_where_it_stood_must_be_calm_for_half_as_long) {
 }
 
 TEST(Survey, quick_looks_do_not_ask_what_presses) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 2, Vec3::Zero(), 0.1);
   bed.begin();
   const Patience quick{true, 3, 5};
@@ -271,7 +270,7 @@ TEST(Survey, quick_looks_do_not_ask_what_presses) {
 }
 
 TEST(Survey, a_load_that_changes_from_look_to_look_is_no_solid_state) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 2, Vec3::Zero(), 5.0);
   bed.begin();
   double weights = 5;
@@ -288,7 +287,7 @@ TEST(Survey, a_load_that_changes_from_look_to_look_is_no_solid_state) {
 TEST(Survey, the_cover_around_what_moves_is_left_out) {
   Settings settings = sleeping_settings();
   settings.depth = 2;  // diameters
-  Bed bed(settings);
+  SurveyedBed bed(settings);
   bed.row(1, 8, Vec3::Zero());
   bed.begin();
   for (int n = 0; n < looks_to_calm + 1; ++n) {
@@ -300,7 +299,7 @@ TEST(Survey, the_cover_around_what_moves_is_left_out) {
 }
 
 TEST(Survey, where_culling_waits_nobody_is_calm) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 3, Vec3::Zero());
   bed.begin();
   for (int n = 0; n < looks_to_calm - 1; ++n) bed.look();
@@ -313,7 +312,7 @@ TEST(Survey, where_culling_waits_nobody_is_calm) {
 // ------------------------------------------------------------------------------------------------------------ ties
 
 TEST(Survey, ties_name_each_pair_that_touches_once_and_leave_out_a_granule_alone_among_exterior_ones) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 3, Vec3::Zero());
   bed.row(4, 3, Vec3(0, 0.05, 0));
   bed.world.add(7, Vec3(0, 0.1, 0), r);  // touches nothing: on a wall, say
@@ -329,7 +328,7 @@ TEST(Survey, ties_name_each_pair_that_touches_once_and_leave_out_a_granule_alone
 }
 
 /// Two bodies of two granules each, which touch without being tied.
-struct TwoBodies : Bed {
+struct TwoBodies : SurveyedBed {
   TwoBodies() {
     const double apart = 2 * r - 5 * weight() / world.deck.stiffness;
     world.add(1, Vec3::Zero(), r);
@@ -368,7 +367,7 @@ TEST(Survey, two_bodies_that_have_rested_against_each_other_are_joined) {
 
 /// The same count, where a granule touches two of the other body.
 TEST(Survey, contacts_do_not_count_one_by_one_before_bodies_join) {
-  Bed bed;
+  SurveyedBed bed;
   const double apart = 2 * r - 5 * bed.weight() / bed.world.deck.stiffness;
   bed.world.add(1, Vec3::Zero(), r);
   bed.world.add(2, Vec3(apart, 0, 0), r);
@@ -420,12 +419,12 @@ TEST(Survey, exterior_granules_are_counted_with_their_energy) {
 // ------------------------------------------------------------------------------------------------------------- what is awake
 
 /// How many each reason keeps awake, as the last look saw it.
-AwakeSteps awake(const Bed& bed, int looks = looks_to_calm) {
+AwakeSteps awake(const SurveyedBed& bed, int looks = looks_to_calm) {
   return bed.parts.survey.count_awake({false, looks, 1}, bed.proposal);
 }
 
 TEST(Awake, each_exterior_granule_has_one_reason) {
-  Bed bed;
+  SurveyedBed bed;
   const Vec3 end = bed.row(1, 3, Vec3::Zero());
   bed.row(4, 1, end + Vec3(0.1, 0, 0));
   bed.row(5, 2, Vec3(0, 0.1, 0));
@@ -444,7 +443,7 @@ TEST(Awake, each_exterior_granule_has_one_reason) {
 }
 
 TEST(Awake, what_the_deck_holds_is_held_and_what_is_not_looked_at_waits) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 3, Vec3::Zero());
   bed.begin();
   bed.world.atoms.groups[bed.world.at(2)] = 0;
@@ -457,7 +456,7 @@ TEST(Awake, what_the_deck_holds_is_held_and_what_is_not_looked_at_waits) {
 }
 
 TEST(Awake, out_of_balance_by_less_than_twice_the_limit) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 2, Vec3::Zero());
   bed.row(3, 2, Vec3(0, 0.1, 0));
   bed.begin();
@@ -472,7 +471,7 @@ TEST(Awake, out_of_balance_by_less_than_twice_the_limit) {
 TEST(Awake, in_solid_state_but_covered) {
   Settings settings = sleeping_settings();
   settings.depth = 1.5;
-  Bed bed(settings);
+  SurveyedBed bed(settings);
   bed.row(1, 6, Vec3::Zero());
   bed.begin();
   for (int n = 0; n < looks_to_calm; ++n) {
@@ -487,7 +486,7 @@ TEST(Awake, in_solid_state_but_covered) {
 }
 
 TEST(Awake, woken_and_still_there_is_awake_in_vain) {
-  Bed bed;
+  SurveyedBed bed;
   bed.row(1, 3, Vec3::Zero());
   bed.begin();
   bed.parts.survey.note_wake(bed.world.at(1));

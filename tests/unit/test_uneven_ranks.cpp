@@ -6,8 +6,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
-
 std::string line_of(int ranks, int here, int there) {
   std::string line;
   SmallDeck deck = empty_space();

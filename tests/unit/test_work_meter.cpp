@@ -5,8 +5,6 @@
 namespace solidcull {
 namespace {
 
-constexpr double r = 0.005;  // m
-
 /// A row of eight: four exterior, three interface granules, the last but one stored.
 struct Row {
   Row() : world(empty_space()), parts(world, sleeping_settings(), 2 * r) {

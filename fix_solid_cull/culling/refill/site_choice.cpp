@@ -14,7 +14,7 @@ std::vector<Sphere> spheres_of(const Atoms& atoms, const std::vector<int>& which
   return spheres;
 }
 
-double longest_way(const std::vector<Sphere>& spheres, const Scales& scales) {
+double way_to_come(const std::vector<Sphere>& spheres, const Scales& scales) {
   double largest = scales.diameter();
   for (const Sphere& s : spheres) largest = std::max(largest, 2 * s.radius);
   return 1.5 * search * largest;  // an octave's sites are for granules of 0.7 to 1.4 of their size
@@ -33,7 +33,7 @@ SiteChoice::SiteChoice(const Bed& bed, const std::vector<int>& going, double wal
       wall_gap_(wall_gap),
       clear_(std::move(clear)),
       spheres_(spheres_of(bed.atoms, going)),
-      walls_(bed.walls, spheres_, longest_way(spheres_, bed.scales) + wall_gap) {
+      walls_(bed.walls, spheres_, way_to_come(spheres_, bed.scales) + wall_gap) {
   std::vector<char> goes(static_cast<std::size_t>(bed.atoms.owned), 0);
   for (const int i : going) goes[static_cast<std::size_t>(i)] = 1;
   std::vector<Sphere> staying;
