@@ -46,10 +46,10 @@ struct RankGrid {
       for (int c = 0; c < cells(d); ++c)
         for (const int image : {0, -1, 1}) {
           if (image && !(periods[d] > 0)) continue;
-          const double by = image * periods[d];
-          if (cuts[d][at(own, d)] + by - width <= cuts[d][static_cast<std::size_t>(c) + 1] &&
-              cuts[d][at(own, d) + 1] + by + width >= cuts[d][static_cast<std::size_t>(c)])
-            near[d].push_back({c, image});
+          // to the last digit as that cell's owner finds it, with the opposite image: else one waits for the other for ever
+          const double by = image * periods[d], before = cuts[d][at(own, d)] - cuts[d][static_cast<std::size_t>(c) + 1],
+                       after = cuts[d][static_cast<std::size_t>(c)] - cuts[d][at(own, d) + 1];
+          if (before + by <= width && after - by <= width) near[d].push_back({c, image});
         }
     std::vector<Partner> all;
     std::vector<std::array<int, 7>> found;  // cell, first of all images, image

@@ -18,6 +18,7 @@ void BetweenRuns::show_bed() {
   if (!bed_.solid.has_store() || !bed_.census.something_locked() || p_.shown.shown()) return;
   leave_lists();
   p_.handover.remember();
+  bed_.memory.freed(p_.exchange.forget_past_motions());
   p_.shown.show();
   bed_.atoms.count_more(bed_.census.stored());
   show_unfinished_ = true;

@@ -104,7 +104,7 @@ void Change::make(Look& look, Phase phase) {
   if (phase == Phase::stepping && bed_.census.something_locked()) forget_lost();
   const Occasion now = begin(look);
   const bool overlaps = now.made && meet_new_granules(phase);
-  bed_.memory.freed(p_.exchange.begin_change());
+  bed_.memory.freed(p_.exchange.forget_past_motions());
   if (!bed_.census.something_locked() && !now.asked && !now.wakes_all) {
     move_cuts();
     return;

@@ -8,7 +8,7 @@ constexpr std::size_t rows_at_once = 100000;
 
 }  // namespace
 
-std::size_t StoreExchange::begin_change() {
+std::size_t StoreExchange::forget_past_motions() {
   if (stored_at_ == never || stored_at_ == bed_.run.step) return 0;
   const std::size_t before = bed_.solid.store().memory_bytes();
   bed_.solid.forget_transient();

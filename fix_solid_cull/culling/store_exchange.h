@@ -34,9 +34,9 @@ class StoreExchange {
   /// Local.
   int stored_groups() const { return stored_groups_; }
   void set_stored_groups(int groups) { stored_groups_ = groups; }
-  /// A membership change begins: what the store keeps for the step in which granules went in is forgotten once that step is over.
-  /// Returns bytes that were freed.
-  std::size_t begin_change();
+  /// Before granules of the store are asked where they are: the motions that they went in with hold for that step alone, and are
+  /// forgotten once it is over. Returns bytes that were freed.
+  std::size_t forget_past_motions();
 
   // lock_step in a compact store, and in one of no places, which need to know no more
   static constexpr std::int64_t locked_long_ago = -1, locked_as_it_was_stored = -2;

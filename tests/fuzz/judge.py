@@ -135,7 +135,7 @@ def read(end, shown):
         end.weight = float(value)
     end.created += sum(map(int, re.findall(r"^Created (\d+) atoms", shown, re.M)))
     totals = {}
-    for name, total in re.findall(r"INFO: Particle insertion (\w+): .*a total of (\d+) particle", shown):
+    for name, total in re.findall(r"INFO: Particle insertion (\w+): inserted .*\s.*a total of (\d+) particle", shown):
         totals[name] = int(total)
     end.created += sum(totals.values())
     end.culled += sum(map(int, re.findall(r"^fix cull solid/cull: .*; culled (\d+)", shown, re.M)))

@@ -61,6 +61,35 @@ TEST(RankGrid, two_cells_are_partners_of_each_other_by_opposite_shifts) {
     }
 }
 
+// Lattices, boxes and skins of round numbers are as far apart as they are wide: five ranks of 7.2 mm, granules of 3 mm and a skin
+// of 0.6 mm waited for each other for ever.
+TEST(RankGrid, cells_just_as_far_apart_as_the_width_are_partners_of_each_other_or_not_at_all) {
+  int ties = 0;
+  for (const bool periodic : {false, true})
+    for (const double edge : {0.036, 0.05, 0.075, 1.0})
+      for (int n = 2; n <= 12; ++n) {
+        RankGrid g = grid_of(1, 1, 1, periodic);
+        g.cuts[0].clear();
+        for (int c = 0; c <= n; ++c) g.cuts[0].push_back(-0.0001 + static_cast<double>(c) / n * edge);
+        if (periodic) g.periods[0] = edge;
+        for (int k = 1; k < n; ++k) {
+          const double width = k * (edge / n);
+          const auto knows = [&](int a, int b) {
+            const auto partners = g.around({a, 0, 0}, width);
+            return std::any_of(partners.begin(), partners.end(), [&](const auto& p) {
+              return p.cell == RankGrid::Cell{b, 0, 0};
+            });
+          };
+          for (int a = 0; a < n; ++a)
+            for (int b = 0; b < a; ++b) {
+              ties += a - b == k + 1;
+              EXPECT_EQ(knows(a, b), knows(b, a)) << n << " of " << edge << " m, " << a << " and " << b << ", width " << width;
+            }
+        }
+      }
+  EXPECT_GT(ties, 1000);
+}
+
 TEST(RankGrid, whoever_is_within_the_width_is_a_partner) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> uniform(0, 1);

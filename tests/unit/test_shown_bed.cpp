@@ -86,6 +86,30 @@ TEST(ShownBed, other_columns_and_groups_change_and_nothing_wakes) {
   }
 }
 
+// no membership has changed since they went in: the store still knows the motion that each had then
+TEST(ShownBed, of_granules_in_flight_stands_where_their_body_is_now) {
+  SmallWorld world((SmallDeck()));
+  Culling culling(world.ports(), sleeping_settings(), 1);
+  std::map<int, Vec3> start;
+  for (int tag = 1; tag <= 12; ++tag) {
+    start[tag] = Vec3(0.001, 0.002, 2 * r * tag);
+    world.add(tag, start[tag], r, Vec3(0.1, 0, 0.3));
+  }
+  world.follow(culling);
+  world.begin_run(&culling);
+  while (culling.value(2) == 0 && world.run.step < 1000) world.steps(&culling, 1);
+  ASSERT_GT(culling.value(2), 0);
+  world.steps(&culling, 7);
+  culling.end_run();
+  culling.show_bed();
+  const Vec3 way = world.atoms.place(world.at(1)) - start[1];
+  for (const auto& from : start) {
+    const int i = world.at(from.first);
+    EXPECT_LE((world.atoms.place(i) - from.second - way).norm(), 1e-12) << from.first;
+    EXPECT_LE((world.atoms.velocity(i) - world.atoms.velocity(world.at(1))).norm(), 1e-9) << from.first;
+  }
+}
+
 TEST(ShownBed, a_granule_that_was_moved_or_struck_wakes_with_its_neighbours_and_keeps_its_contacts) {
   SmallWorld world(on_a_floor());
   AsleepColumn column(world);

@@ -129,7 +129,7 @@ TEST(StoreExchange, a_granule_that_comes_back_later_has_its_bodys_motion_and_its
   c.parts.put_away({2, 3, 5});
   c.parts.bed.solid.body(c.parts.body_of(1)).shift(Vec3(0.001, 0, 0));
   ++c.world.run.step;
-  EXPECT_GT(c.parts.exchange.begin_change(), 0u);  // the motions of single granules are forgotten: the body has them
+  EXPECT_GT(c.parts.exchange.forget_past_motions(), 0u);  // the motions of single granules are forgotten: the body has them
   const SolidBody& body = c.parts.bed.solid.bodies().body(c.parts.body_of(3));
   const int i = c.parts.exchange.bring_back(3);
   EXPECT_EQ(c.world.at(3), i);

@@ -48,7 +48,7 @@ struct WorldParts : CullingParts {
   /// The first half of a membership change: nothing goes to the store or comes out by the shell's closure. Collective.
   void change(Wakes wakes, Proposal proposal) {
     bed.see_largest_radius();
-    exchange.begin_change();
+    exchange.forget_past_motions();
     MembershipChange c(bed, for_change(), std::move(wakes), std::move(proposal));
     bed.index.index(world.atoms);
     c.free_and_lock();
