@@ -30,10 +30,6 @@ class Arrivals {
  public:
   void announce(std::int64_t tag, const Arrival& a) { announced_[tag] = a; }
   const Arrival* find(std::int64_t tag) const { return announced_.find(tag); }
-  template <class Visit>
-  void for_each_tag(Visit visit) const {
-    announced_.for_each([&](std::int64_t tag, const Arrival&) { visit(tag); });
-  }
   /// It has come. InternalError for one that was not announced.
   Arrival take(std::int64_t tag) {
     const Arrival* a = announced_.find(tag);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -94,17 +93,13 @@ void BodyGroups::tell_links(std::map<int, std::vector<PartLink>>& links, const s
   std::map<int, std::vector<Row>> out;  // by rank
   for (const auto& [body, of_body] : links)
     for (const PartLink& l : of_body) out[l.rank].push_back({body, l.body, triple(l.to_other), l.tied_anew});
-  for (const int rank : ranks) bed_.ranks.send(rank, out[rank].data(), out[rank].size() * sizeof(Row));
-  for (const int rank : ranks) {
-    const std::vector<char> bytes = bed_.ranks.receive(rank);
-    std::vector<Row> rows(bytes.size() / sizeof(Row));
-    if (!rows.empty()) std::memcpy(rows.data(), bytes.data(), bytes.size());
-    for (const Row& r : rows) {
+  for (const int rank : ranks) bed_.ranks.send_rows(rank, out[rank]);
+  for (const int rank : ranks)
+    for (const Row& r : bed_.ranks.receive_rows<Row>(rank)) {
       std::vector<PartLink>& of_body = links[r.to];
       if (std::none_of(of_body.begin(), of_body.end(), [&](const PartLink& l) { return l.rank == rank && l.body == r.from; }))
         of_body.push_back({rank, r.from, -vec(r.to_other), r.tied_anew});
     }
-  }
 }
 
 void BodyGroups::settle_those_here() {

@@ -1,7 +1,6 @@
 #include "handover.h"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 namespace solidcull {
@@ -84,17 +83,14 @@ void Handover::send_home() {
     const auto to = leaving_.find(rank);
     std::vector<double> numbers;
     if (to != leaving_.end()) numbers = parcels_.pack(to->second.stored, to->second.atoms);
-    bed_.ranks.send(rank, numbers.data(), numbers.size() * sizeof(double));
+    bed_.ranks.send_rows(rank, numbers);
   }
   if (!leaving_.empty()) leave();
   leaving_.clear();
   std::vector<std::vector<double>> came;  // parcels point into them
   std::vector<Parcel> parcels;
   for (const int rank : neighbours) {
-    const std::vector<char> bytes = bed_.ranks.receive(rank);
-    came.emplace_back(bytes.size() / sizeof(double));
-    if (bytes.empty()) continue;
-    std::memcpy(came.back().data(), bytes.data(), bytes.size());
+    came.push_back(bed_.ranks.receive_rows<double>(rank));
     for (Parcel& p : parcels_.unpack(came.back().data(), came.back().size(), bed_.solid.contacts().width())) {
       p.for_this_rank = true;  // the other rank has seen to that, by places that are rounded here
       parcels.push_back(std::move(p));

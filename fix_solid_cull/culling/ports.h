@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <functional>
 #include <map>
 #include <memory>
@@ -258,6 +259,17 @@ class Ranks {
   /// Between two ranks that both know of it: messages come in the order in which they were sent. The sender does not wait.
   virtual void send(int rank, const void* bytes, std::size_t n) const = 0;
   virtual std::vector<char> receive(int rank) const = 0;
+  template <class Row>
+  void send_rows(int rank, const std::vector<Row>& rows) const {
+    send(rank, rows.data(), rows.size() * sizeof(Row));
+  }
+  template <class Row>
+  std::vector<Row> receive_rows(int rank) const {
+    const std::vector<char> bytes = receive(rank);
+    std::vector<Row> rows(bytes.size() / sizeof(Row));
+    if (!rows.empty()) std::memcpy(rows.data(), bytes.data(), bytes.size());
+    return rows;
+  }
   /// The sum over the ranks before this one. Collective.
   virtual std::int64_t sum_before(std::int64_t number) const = 0;
 

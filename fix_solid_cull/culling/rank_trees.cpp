@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <tuple>
 
 namespace solidcull {
@@ -54,14 +55,11 @@ void RankTrees::grow(const std::map<int, std::vector<PartLink>>& links, const Ve
     for (const auto& [body, g] : growing)
       for (const PartLink& l : *g.links)
         out[l.rank].push_back({{l.body, body}, g.part.key, g.branch.level, g.branch.parent, triple(g.part.shift)});
-    for (const auto& [rank, notes] : out) ranks_.send(rank, notes.data(), notes.size() * sizeof(Note));
+    for (const auto& [rank, notes] : out) ranks_.send_rows(rank, notes);
   };
   const auto hear = [&] {
     for (const auto& [rank, notes] : out) {
-      const std::vector<char> in = ranks_.receive(rank);
-      std::vector<Note> heard(in.size() / sizeof(Note));
-      if (!heard.empty()) std::memcpy(heard.data(), in.data(), in.size());
-      for (const Note& n : heard) {
+      for (const Note& n : ranks_.receive_rows<Note>(rank)) {
         const auto at = growing.find(n.address.to);
         if (at == growing.end()) throw InternalError("a part of a body is tied to one that is not there");
         const std::vector<PartLink>& to = *at->second.links;
