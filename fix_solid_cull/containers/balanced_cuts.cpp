@@ -1,6 +1,7 @@
 #include "balanced_cuts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -74,8 +75,13 @@ double load_at(double x, double below, double above, const std::vector<double>& 
   return load;
 }
 
-/// One cut after the other goes where the load is least; `before`: none goes past a neighbouring one of these.
-Cuts descend(Cuts cuts, const Cuts& before, const WorkGrid& grid, double thinnest) {
+/// Where cut k may go from and to; nothing has strayed in over the ends of the box.
+std::array<double, 2> room(const std::vector<double>& before, std::size_t k, double strayed) {
+  return {before[k - 1] + (k > 1 ? strayed : 0), before[k + 1] - (k + 2 < before.size() ? strayed : 0)};
+}
+
+/// One cut after the other goes where the load is least.
+Cuts descend(Cuts cuts, const Cuts& before, const WorkGrid& grid, double thinnest, double strayed) {
   for (int sweep = 0; sweep < sweeps; ++sweep)
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::vector<double>& edges = grid.edges[axis];
@@ -83,8 +89,8 @@ Cuts descend(Cuts cuts, const Cuts& before, const WorkGrid& grid, double thinnes
       if (now.size() <= 2) continue;
       const Sums sums = sums_along(static_cast<int>(axis), cuts, grid);
       for (std::size_t k = 1; k + 1 < now.size(); ++k) {
-        double lo = std::max(now[k - 1] + thinnest, before[axis][k - 1]),
-               hi = std::min(now[k + 1] - thinnest, before[axis][k + 1]);
+        const auto [from, to] = room(before[axis], k, strayed);
+        double lo = std::max(now[k - 1] + thinnest, from), hi = std::min(now[k + 1] - thinnest, to);
         if (lo >= hi) continue;
         double best = now[k], least = load_at(best, now[k - 1], now[k + 1], edges, sums);
         for (int narrowing = 0; narrowing < narrowings; ++narrowing) {
@@ -103,7 +109,7 @@ Cuts descend(Cuts cuts, const Cuts& before, const WorkGrid& grid, double thinnes
 }
 
 /// Cuts that give each slab along an axis the same, as far as they may go.
-Cuts even_slabs(const Cuts& cuts, const WorkGrid& grid, double thinnest) {
+Cuts even_slabs(const Cuts& cuts, const WorkGrid& grid, double thinnest, double strayed) {
   Cuts even = cuts;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Cuts one = {std::vector<double>{grid.edges[0].front(), grid.edges[0].back()},
@@ -116,15 +122,18 @@ Cuts even_slabs(const Cuts& cuts, const WorkGrid& grid, double thinnest) {
       const double wanted = sum.back() * static_cast<double>(k) / static_cast<double>(parts);
       const std::size_t b = static_cast<std::size_t>(std::upper_bound(sum.begin() + 1, sum.end() - 1, wanted) - sum.begin()) - 1;
       const double in_bin = sum[b + 1] - sum[b], at = in_bin > 0 ? std::clamp((wanted - sum[b]) / in_bin, 0.0, 1.0) : 0.5;
-      now[k] = std::clamp(edges[b] + at * (edges[b + 1] - edges[b]), cuts[axis][k - 1], cuts[axis][k + 1]);
+      const auto [from, to] = room(cuts[axis], k, strayed);
+      now[k] = std::max(from, std::min(edges[b] + at * (edges[b + 1] - edges[b]), to));
     }
     for (std::size_t k = 1; k < parts; ++k) now[k] = std::max(now[k], now[k - 1] + thinnest);
     for (std::size_t k = parts - 1; k > 0; --k) now[k] = std::min(now[k], now[k + 1] - thinnest);
-    for (std::size_t k = 1; k < parts; ++k)
-      if (now[k] < now[k - 1] + thinnest * (1 - 1e-9) || now[k] < cuts[axis][k - 1] || now[k] > cuts[axis][k + 1]) {
+    for (std::size_t k = 1; k < parts; ++k) {
+      const auto [from, to] = room(cuts[axis], k, strayed);
+      if (now[k] < now[k - 1] + thinnest * (1 - 1e-9) || now[k] < from || now[k] > to) {
         now = cuts[axis];
         break;
       }
+    }
   }
   return even;
 }
@@ -148,9 +157,10 @@ std::vector<double> even_edges(double lo, double hi, const std::vector<double>& 
   return edges;
 }
 
-Cuts balanced_cuts(const Cuts& cuts, const WorkGrid& grid, double thinnest) {
-  const Cuts moved = descend(cuts, cuts, grid, thinnest);
-  const Cuts anew = descend(even_slabs(cuts, grid, thinnest), cuts, grid, thinnest);  // where that ends in a valley of its own
+Cuts balanced_cuts(const Cuts& cuts, const WorkGrid& grid, double thinnest, double strayed) {
+  const Cuts moved = descend(cuts, cuts, grid, thinnest, strayed);
+  // where that ends in a valley of its own
+  const Cuts anew = descend(even_slabs(cuts, grid, thinnest, strayed), cuts, grid, thinnest, strayed);
   return imbalance(anew, grid) < imbalance(moved, grid) ? anew : moved;
 }
 

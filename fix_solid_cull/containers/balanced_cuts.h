@@ -21,10 +21,10 @@ struct WorkGrid {
 /// Edges that part what `slices`, equally thick from lo to hi, hold into `bins` of about the same.
 std::vector<double> even_edges(double lo, double hi, const std::vector<double>& slices, std::size_t bins);
 
-/// Cuts at which the most loaded rank has little more than the mean, as far as straight cuts can, and as these hold: no cut goes
-/// past where a neighbouring one was, so that nothing changes over to a rank that is no neighbour, and no two are nearer than
-/// `thinnest` (m). The ends stay.
-Cuts balanced_cuts(const Cuts& cuts, const WorkGrid& grid, double thinnest);
+/// Cuts at which the most loaded rank has little more than the mean, as far as straight cuts can, and as these hold: nothing
+/// changes over to a rank that is no neighbour, and no two cuts are nearer than `thinnest` (m). The ends stay. What a rank has
+/// may lie `strayed` (m) beyond its cuts: so no cut comes nearer to where a neighbouring one was.
+Cuts balanced_cuts(const Cuts& cuts, const WorkGrid& grid, double thinnest, double strayed);
 
 /// Largest work of a rank over the mean.
 double imbalance(const Cuts& cuts, const WorkGrid& grid);

@@ -87,12 +87,28 @@ WorkGrid Balance::work_in(const Cuts& cuts) const {
   return grid;
 }
 
+/// How far atoms lie beyond the cuts of their rank (m): the engine has not sent them on since they moved, or the box has.
+double Balance::strayed(const Cuts& cuts) const {
+  const Box own = bed_.ranks.own();
+  double farthest = 0;
+  for (int d = 0; d < 3; ++d) {
+    const bool ends_below = own.lo[d] == cuts[d].front(), ends_above = own.hi[d] == cuts[d].back();
+    for (int i = 0; i < bed_.atoms.owned; ++i) {
+      const double x = bed_.atoms.place(i)[d];
+      if (!ends_below) farthest = std::max(farthest, own.lo[d] - x);
+      if (!ends_above) farthest = std::max(farthest, x - own.hi[d]);
+    }
+  }
+  bed_.ranks.largest(&farthest, 1);
+  return farthest;
+}
+
 bool Balance::move() {
   if (!due_) return false;
   due_ = false;
   const Cuts before = bed_.ranks.cuts();
   const WorkGrid grid = work_in(before);
-  const Cuts cuts = balanced_cuts(before, grid, bed_.ranks.thinnest());
+  const Cuts cuts = balanced_cuts(before, grid, bed_.ranks.thinnest(), strayed(before));
   double farthest = 0;  // in subdomains
   for (int d = 0; d < 3; ++d)
     for (std::size_t k = 1; k + 1 < cuts[d].size(); ++k)

@@ -25,6 +25,7 @@ class Balance {
  private:
   double measure() const;
   WorkGrid work_in(const Cuts& cuts) const;
+  double strayed(const Cuts& cuts) const;
 
   const Bed& bed_;
   bool due_ = false;
