@@ -450,9 +450,12 @@ class Grammar(MoreEvents):
 
     def push(self):
         push = self.name("push")
-        self.say(f"fix {push} {self.some()} addforce 0 0 {self.rng.choice((1e-4, -1e-4, 1e-3))}")
+        group, force = self.some(), self.rng.choice((1e-4, -1e-4, 1e-3))
+        self.say(f"fix {push} {group} addforce 0 0 {force}")
         if self.chance(0.6):
             self.say(f"run {self.rng.choice((50, 100))}", f"unfix {push}")
+        elif force == 1e-3:
+            self.traits.add("loose")  # three times the weight: granules are shot through the lid
         self.traits.add("driven")
 
     def drive(self):
