@@ -19,7 +19,8 @@ from shrink import shrink  # noqa: E402
 SEEDS = (6, 10, 11, 12, 16, 21, 23, 25, 28, 29, 31, 32, 34, 37, 42, 43, 44, 46, 47, 49)  # of 50, those that cull
 RANKS = (1, 1, 1, 1, 2)
 MORE_SEEDS = (2008, 2026, 2031, 2034)           # went wrong before what they try was taken
-MANY_RANKS_SEEDS = (1086, 1112, 1222, 3015)     # a bed in flight; cuts that move; ranks just as far apart as they look; cuts again
+# a bed in flight; cuts that move, twice; ranks just as far apart as they look
+SEVERAL_RANKS_SEEDS = (1086, 1112, 3015, 1222)
 LIBRARY_SEEDS = (2012, 2013, 2027, 2036, 2037)  # likewise
 HEAD = """\
 atom_style granular
@@ -99,12 +100,12 @@ class RandomDecks(unittest.TestCase):
                                              f"{','.join(map(str, RANKS))} --library {'all' if library else 'none'} --shrink")
 
 
-    def test_decks_on_many_ranks(self):
+    def test_decks_on_several_ranks(self):
         with tempfile.TemporaryDirectory(prefix="solidcull-fuzz-") as folder:
-            for seed in MANY_RANKS_SEEDS:
+            for seed in SEVERAL_RANKS_SEEDS:
                 with self.subTest(seed=seed):
                     deck = grammar.make(seed)
-                    self.assertGreater(deck.ranks[0], 2)
+                    self.assertGreater(deck.ranks[0], 1)
                     verdict = fuzz.verdict_of(deck, Path(folder) / str(seed))
                     self.assertEqual(verdict.kind, "good", f"{verdict.text}\ntests/fuzz/fuzz.py --seed {seed} --count 1 --shrink")
 
