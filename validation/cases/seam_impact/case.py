@@ -1,38 +1,37 @@
-"""The strike of examples/impact at the seam of a box that is periodic in x and y."""
+"""The ball of slow_impact falls at the seam of a box that is periodic in x and y."""
 import numpy as np
 
 from solidcull_runs import measures, meshes
 
-deck, bed = "seam_impact.in", "settle.in"
-bed_uses = ("bed_granules", "L")
-quick = {"granules": 6001, "bed_granules": 6000, "L": 0.05, "steps": 2500}
-full = {"granules": 20001, "bed_granules": 20000, "L": 0.075, "steps": 8000}
-aside = "dx"
-curves = {"largest depth": "v_depth", "mean kinetic energy": "c_bedke", "peak load on the floor": "v_floor"}
-picture = ("y", 0.5, 0.005)
+deck, bed, bed_uses = "../slow_impact/impact.in", "../../shared/pour.in", ("bed_granules", "L", "W", "sides", "planes", "around")
+periodic = {"sides": "p", "planes": 0, "around": 0, "middle": 0.004}  # of L: the ball reaches over the seam
+quick = {"granules": 6001, "bed_granules": 6000, "L": 0.05, "W": 0.05, "steps": 2800, **periodic}
+full = {"granules": 20001, "bed_granules": 20000, "L": 0.075, "W": 0.075, "steps": 6000, **periodic}
+aside = "aside"
+curves = {"depth": "v_depth", "peak force on the ball": "v_force", "peak rise of the floor's load": "v_floor"}
+picture = ("y", 0.5, 0.004)
 CELL = 5e-4  # m, of the height map
 
 
 def files(folder, v):
-    meshes.write_stl(folder / "floor.stl", meshes.grid((0, 0, 0), (v["L"], 0, 0), (0, v["L"], 0), 4, 4))
+    meshes.write_stl(folder / "floor.stl", meshes.grid((0, 0, 0), (v["L"], 0, 0), (0, v["W"], 0), 8, 8))
 
 
 def measure(run, v):
-    side = v["L"]
-    depth, force, energy, floor = (run.series(c)[1] for c in ("v_depth", "v_force", "c_bedke", "v_floor"))
-    after, before = (height_map(g[g["radius"] < 0.005], side) for g in (run.final, run.start))
-    change = (after - before) * CELL**2
-    apart = [run.final[c] - run.start[c] for c in "xyz"]
-    apart[:2] = [d - side * np.round(d / side) for d in apart[:2]]  # the nearest image
-    way = np.sqrt(sum(d**2 for d in apart))[run.final["radius"] < 0.005]
-    return {"largest depth": depth.max(), "depth at the end": depth[-1], "peak force on the ball": force.max(),
-            "mean kinetic energy": energy.mean(), "peak kinetic energy": energy.max(), "peak load on the floor": floor.max(),
-            "load on the floor at the end": floor[-1], "sum of displacements": way.sum(), "crater": -change[change < 0].sum(),
+    size = v["L"], v["W"]
+    depth, force, floor = (run.series(c)[1] for c in ("v_depth", "v_force", "v_floor"))
+    start, end = (g[g["radius"] < 0.004] for g in (run.start, run.final))
+    change = (height_map(end, size) - height_map(start, size)) * CELL**2
+    apart = [end[c] - start[c] for c in "xyz"]
+    for d in (0, 1):
+        apart[d] -= size[d] * np.round(apart[d] / size[d])  # the nearest image
+    return {"depth": depth.max(), "peak force on the ball": force.max(), "peak rise of the floor's load": floor.max() - floor[0],
+            "sum of displacements": np.sqrt(sum(d**2 for d in apart)).sum(), "crater": -change[change < 0].sum(),
             "heap": change[change > 0].sum()}
 
 
-def height_map(granules, side):
+def height_map(granules, size):
     """With the ball's place in the middle, where its crater is whole."""
     moved = granules.copy()
-    moved["x"] = (moved["x"] + side / 2) % side
-    return measures.height_map(moved, (0, 0), (side, side), CELL)
+    moved["x"] = (moved["x"] + size[0] / 2) % size[0]
+    return measures.height_map(moved, (0, 0), size, CELL)
