@@ -14,15 +14,16 @@ namespace solidcull {
 
 /// One that another rank has announced in this reneighbouring; the engine brings its atom.
 struct Arrival {
-  SolidBodies::Place at;
-  double mass = 0, radius = 0;
-  bool held = false;
+  int body = 0;
+  GranuleMass granule{0, Vec3::Zero(), 0};  ///< in the frame of the body
+  int clump = 0;                            ///< that it is a sphere of
 };
 
 /// One that the engine does not have any more, and its body has still; in the frame of that.
 struct LostGranule {
   std::int64_t tag;
   GranuleMass granule;
+  int clump = 0;  ///< that it was a sphere of
 };
 
 /// Local.
@@ -41,9 +42,7 @@ class Arrivals {
   /// Those that have not come, by tag; none is announced afterwards.
   std::vector<LostGranule> take_missing() {
     std::vector<LostGranule> lost;
-    announced_.for_each([&](std::int64_t tag, const Arrival& a) {
-      lost.push_back({tag, {a.mass, a.at.position, a.radius, a.held}});
-    });
+    announced_.for_each([&](std::int64_t tag, const Arrival& a) { lost.push_back({tag, a.granule, a.clump}); });
     std::sort(lost.begin(), lost.end(), [](const LostGranule& a, const LostGranule& b) { return a.tag < b.tag; });
     clear();
     return lost;
@@ -54,10 +53,13 @@ class Arrivals {
     FlatMap<Arrival> moved;
     announced_.for_each([&](std::int64_t tag, Arrival a) {
       const int body = bodies.body_of(tag);
-      const Pose &from = bodies.pose(a.at.body), &to = bodies.pose(body);
-      if (from != to) a.at.position = to.to_frame(from.to_world(a.at.position));
-      if (a.at.body != body) solid.tell_granule(body, {a.at.position, a.radius});
-      a.at.body = body;
+      const Pose &from = bodies.pose(a.body), &to = bodies.pose(body);
+      if (from != to) {
+        a.granule.position = to.to_frame(from.to_world(a.granule.position));
+        if (a.granule.clump) a.granule.clump = a.granule.clump->seen_from(from, to);
+      }
+      if (a.body != body) solid.tell_granule(body, {a.granule.position, a.granule.radius});
+      a.body = body;
       moved[tag] = a;
     });
     announced_ = std::move(moved);

@@ -3,7 +3,12 @@
 namespace solidcull {
 
 Bed::Bed(const Ports& engine, const Settings& settings, int types)
-    : BedState(engine, settings), stored(*this), masses(*this), groups(*this, stored, masses), census(*this) {
+    : BedState(engine, settings),
+      stored(*this),
+      masses(*this),
+      clump_spheres(*this),
+      groups(*this, stored, masses),
+      census(*this) {
   solid.set_types(types);
   solid.followed_by(*this);
 }
@@ -11,6 +16,7 @@ Bed::Bed(const Ports& engine, const Settings& settings, int types)
 void Bed::came_off(std::int64_t tag, int body, const Vec3& place) {
   const int i = index.at(tag);
   solid.tell_granule(shell[i].body, {shell[i].place, atoms.radius[i]});
+  locked_clumps.shift(tag, place - shell[i].place);
   shell.set_place(i, {body, place});
 }
 
@@ -23,6 +29,7 @@ void Bed::adopt_places() {
     const Pose &from = bodies.pose(before), &to = bodies.pose(body);
     if (from != to) {
       shell.reframe(i, from, to);
+      locked_clumps.reframe(atoms.tag[i], from, to);
       solid.turn_contacts(atoms.tag[i], to.turn().transpose() * from.turn());
     }
     shell.set_body(i, body);
@@ -40,7 +47,14 @@ StoredGranule Bed::interface_granule(int i) const {
   g.body = e.body;
   g.position = e.place;
   g.radius = atoms.radius[i];
-  g.mass = atoms.mass[i];
+  g.mass = e.clump ? 0 : atoms.mass[i];
+  g.clump = e.clump;
+  g.spheres = e.spheres;
+  if (const Clump* const c = e.clump ? locked_clumps.find(g.tag) : nullptr) {
+    g.has_clump = true;
+    g.mass = c->mass;
+    g.of_clump = c->lies;
+  }
   g.held = e.held;
   g.lock_step = e.lock_step;
   g.normal_load = e.normal_load;
@@ -48,9 +62,25 @@ StoredGranule Bed::interface_granule(int i) const {
   return g;
 }
 
+void Bed::leaves_rank(int i) {
+  locked_clumps.to_world(atoms.tag[i], solid.bodies().pose(shell[i].body));
+  shell.leaves_rank(i);
+}
+
+void Bed::arrives(int i, const SolidBodies::Place& at) {
+  shell.arrives(i, at);
+  const Pose& pose = solid.bodies().pose(at.body);
+  if (const Clump* const c = shell[i].clump ? locked_clumps.find(atoms.tag[i]) : nullptr) {
+    locked_clumps.shift(atoms.tag[i], solid.nearest_image(c->lies.centre, pose.to_world(at.position)) - c->lies.centre);
+    locked_clumps.to_frame(atoms.tag[i], pose);
+  }
+}
+
 void Bed::see_largest_radius() {
-  largest_radius = largest_radius_here(*this);
-  ranks.largest(&largest_radius, 1);
+  double all[2] = {largest_radius_here(*this), clumps.largest()};
+  ranks.largest(all, 2);
+  largest_radius = all[0];
+  largest_clump = all[1];
 }
 
 Wakes Bed::take_wakes(bool all) {

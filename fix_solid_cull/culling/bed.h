@@ -6,6 +6,7 @@
 #include "bed_state.h"
 #include "body_groups.h"
 #include "census.h"
+#include "clump_spheres.h"
 #include "granule_masses.h"
 #include "stored_search.h"
 #include "wake_requests.h"
@@ -24,6 +25,9 @@ struct Bed : BedState, BodyFollower {
   void adopt_places();
   /// Interface granule i as its body knows it, with what it has in the shell. Local.
   StoredGranule interface_granule(int i) const;
+  /// Interface granule i leaves this rank, or has come to stand in a body of it.
+  void leaves_rank(int i);
+  void arrives(int i, const SolidBodies::Place& at);
   /// The largest radius is known on all ranks. Collective; a change does it, too.
   void see_largest_radius();
   /// All that wakes on this rank, `all` if some rank has asked so. Collective.
@@ -33,6 +37,7 @@ struct Bed : BedState, BodyFollower {
 
   const StoredSearch stored;
   const GranuleMasses masses;
+  const ClumpSpheres clump_spheres;
   BodyGroups groups;
   Census census;
   mutable WakeRequests wake;  ///< whoever sees the bed may ask it to wake

@@ -148,14 +148,13 @@ void BodyGroups::settle_those_over_ranks(TakesPart takes_part) {
   trees_.unite(
       parts,
       [](Part& whole, const Part& other) {
-        if (other.mass == 0) return;
         if (whole.mass == 0) {
-          whole = other;
-          return;
+          whole.set(other.sum());
+        } else if (other.mass != 0) {
+          RigidSum sum = whole.sum();
+          sum.add(other.sum());
+          whole.set(sum);
         }
-        RigidSum sum = whole.sum();
-        sum.add(other.sum());
-        whole.set(sum);
         whole.grounded_mass += other.grounded_mass;
         for (int d = 0; d < 3; ++d) whole.tied[d] = whole.tied[d] || other.tied[d];
         whole.grounded = whole.grounded || other.grounded;
@@ -165,6 +164,7 @@ void BodyGroups::settle_those_over_ranks(TakesPart takes_part) {
   for (std::size_t p = 0; p < parts.size(); ++p) {
     if (!takes_part(static_cast<int>(p)) || !part(p)) continue;
     const Part& whole = parts[p];
+    if (whole.mass == 0) continue;  // spheres of clumps whose mass has been lost
     const int number = trees_.parts()[p].body;
     bed_.solid.ground(number, whole.grounded && whole.held);
     bed_.solid.body(number).settle_as_part(whole.sum(), SolidBody::free_axes(whole.tied), trees_.parts()[p].shift,

@@ -30,6 +30,7 @@ void BodyMotion::refresh() {
   slot_.clear();
   place_.clear();
   riding_.clear();
+  clumps_.clear();
   if (bed_.solid.bodies().bodies().empty()) return;
   const Atoms& atoms = bed_.atoms;
   FlatMap<int> slot;
@@ -62,6 +63,23 @@ void BodyMotion::refresh() {
     slot_.push_back(static_cast<std::size_t>(*s));
     if (!active_[*s].stands) riding_.push_back(atoms_.size() - 1);
     place_.push_back(bed_.shell[i].place);
+  }
+  if (bed_.clumps.possible) list_clumps();
+}
+
+void BodyMotion::list_clumps() {
+  FlatMap<int> place;
+  for (const int i : atoms_) {
+    const Locked& e = bed_.shell[i];
+    if (e.clump == 0) continue;
+    const auto known = place.find(e.clump);
+    const std::size_t at = known ? static_cast<std::size_t>(*known) : clumps_.size();
+    if (!known) {
+      place[e.clump] = static_cast<int>(at);
+      clumps_.emplace_back();
+    }
+    clumps_[at].atoms.push_back(i);
+    clumps_[at].share = static_cast<double>(clumps_[at].atoms.size()) / e.spheres;
   }
 }
 
@@ -107,6 +125,7 @@ void BodyMotion::take_loads() {
     atoms.clear_force(i);
     if (turns) atoms.clear_torque(i);  // else what walls turn is the granule alone: the engine's integrator sees to that
   }
+  if (!clumps_.empty()) take_loads_of_clumps();
   if (bed_.scales.sleeping())
     for (ActiveBody& a : active_)
       if (a.stands) a.change += bed_.solid.wall_loads().force(a.number) + a.body->mass.mass * g;
@@ -114,6 +133,20 @@ void BodyMotion::take_loads() {
   for (ActiveBody& a : active_) a.torque += (a.body->pose.origin() - a.body->motion.centre()).cross(a.force);
   sum_over_ranks();
   for (ActiveBody& a : active_) a.force += a.body->motion.mass() * g;
+}
+
+/// Besides what each of its spheres bears: what the clump bears as a whole. A rank that has some of its spheres only lets these
+/// have their share of the tolerance, so that all together have it at most.
+void BodyMotion::take_loads_of_clumps() {
+  for (const ClumpHere& c : clumps_) {
+    const int first = c.atoms.front();
+    Vec3 change = Vec3::Zero();
+    for (const int i : c.atoms) change += bed_.shell[i].load_change;
+    const double tolerance = c.share * bed_.scales.wake_up().tolerance(bed_.atoms.mass[first], bed_.shell[first].normal_load);
+    const double excess = change.norm() / tolerance;
+    bed_.shell.raise_excess(first, excess);
+    largest_excess_ = std::max(largest_excess_, excess);
+  }
 }
 
 void BodyMotion::sum_over_ranks() {

@@ -80,6 +80,8 @@ class BodyMotion : public BodyFollower {
   std::vector<FieldInFrame> fields() const;
   void give_velocity(std::size_t k, const std::vector<FieldInFrame>& of);
   void add_to_body(std::size_t k, const Vec3& contact, const Vec3& torque);
+  void list_clumps();
+  void take_loads_of_clumps();
   void sum_over_ranks();
   [[noreturn]] void stop_at(const ActiveBody& a) const;
   double way_in_a_step(const ActiveBody& a) const;
@@ -90,6 +92,11 @@ class BodyMotion : public BodyFollower {
   std::vector<std::size_t> slot_;    // their bodies in active_
   std::vector<Vec3> place_;          // and places there
   std::vector<std::size_t> riding_;  // those of them whose bodies move
+  struct ClumpHere {
+    std::vector<int> atoms;  // indices of its spheres
+    double share;            // of all its spheres
+  };
+  std::vector<ClumpHere> clumps_;
   bool stale_ = true;
   struct Told {
     Vec3 here = Vec3::Zero(), all = Vec3::Zero();  // what pressed on a body that stands: on this rank, and on all

@@ -55,7 +55,7 @@ bool Change::any_far_out() const {
 auto Change::begin(const Look& look) -> Occasion {
   std::int64_t highest = 0;
   for (int i = 0; i < bed_.atoms.owned; ++i) highest = std::max<std::int64_t>(highest, bed_.atoms.tag[i]);
-  enum { asked, wakes_all, lets_go, asks_to_store, made, far, unsettled, tag, radius, numbers };
+  enum { asked, wakes_all, lets_go, asks_to_store, made, far, unsettled, tag, radius, clump, numbers };
   double all[numbers] = {};
   all[asked] = look.chosen().any_here() || bed_.wake.any_here();
   all[wakes_all] = bed_.wake.asks_all();
@@ -66,8 +66,10 @@ auto Change::begin(const Look& look) -> Occasion {
   all[unsettled] = unsettled_;
   all[tag] = static_cast<double>(highest);
   all[radius] = largest_radius_here(bed_);
+  all[clump] = bed_.clumps.largest();
   bed_.ranks.largest(all, numbers);
   bed_.largest_radius = all[radius];
+  bed_.largest_clump = all[clump];
   bed_.ranks.expect_far_out(all[far] != 0);
   if (all[unsettled] != 0) settle_bodies();
   Occasion now;
@@ -84,7 +86,7 @@ auto Change::see(bool shell_changed, const MembershipChange& c) -> Outcome {
   enum { changed, leave, sorts, map, bodies, locked, stored, atoms, numbers };
   std::int64_t all[numbers] = {};
   all[changed] = shell_changed;
-  all[leave] = p_.handover.find_leaving();
+  all[leave] = p_.handover.find_leaving(p_.deep.take_away_from_home());
   all[sorts] = static_cast<double>(c.moved()) > sort_share * bed_.atoms.owned;
   all[map] = bed_.atoms.map_is_too_small();
   all[bodies] = static_cast<std::int64_t>(bed_.solid.bodies().size());

@@ -32,8 +32,7 @@ std::vector<std::int64_t> ChunkShares::interface_tags() const {
 }
 
 int ChunkShares::owner(const std::uint64_t* g) const {
-  const Vec3 place(number_of(g[granule_place]), number_of(g[granule_place + 1]), number_of(g[granule_place + 2]));
-  return bed_.ranks.owner(reader_.sender().bodies.at(g[granule_body]).pose.to_world(place));
+  return bed_.ranks.owner(reader_.sender().bodies.at(g[granule_body]).pose.to_world(granule_home(g)));
 }
 
 /// The body's number as this rank knows it; the body goes along if it does not.

@@ -41,6 +41,8 @@ void Culling::begin_run() {
         "the contact model has, or had, neither friction nor rolling friction, and changes while granules are culled: "
         "unfix " +
         bed_.run.name + " before the pair_style changes");
+  if (bed_.clumps.possible && bed_.scales.refills())
+    throw InputError("store none has sites for spheres, not for clumps: use store exact or store compact");
   bed_.ranks.update();
   Vec3 periods = bed_.run.edges();
   for (int d = 0; d < 3; ++d)

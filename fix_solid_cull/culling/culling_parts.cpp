@@ -30,7 +30,7 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       run_end(bed, meter, report, balance),
       files(bed, meshes, report),
       invariants(bed),
-      followers{&bed.shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown} {
+      followers{&bed.shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown, &bed.locked_clumps} {
   for (BodyFollower* f : std::initializer_list<BodyFollower*>{&motion, &closure, &handover, &cover, &meshes})
     bed.solid.followed_by(*f);
   for (StoreFollower* f : std::initializer_list<StoreFollower*>{&walls, &grounding, &cover, &refill}) exchange.followed_by(*f);

@@ -158,16 +158,39 @@ class DeepGranules::Surroundings {
   std::vector<Box> opened_;
 };
 
-std::size_t DeepGranules::store(const Occasion& now, const PutAway& put_away) {
+bool DeepGranules::looks_for_some(const Occasion& now) {
   asked_ = false;
-  if (!now.locked_now && !now.asked && (!bed_.scales.sleeping() || ++builds_without_storing_ < builds_between_storing)) return 0;
+  if (!now.locked_now && !now.asked && (!bed_.scales.sleeping() || ++builds_without_storing_ < builds_between_storing))
+    return false;
   builds_without_storing_ = 0;
-  if (!now.locked_now && !bed_.scales.sleeping()) return 0;
+  return now.locked_now || bed_.scales.sleeping();
+}
+
+/// Of clumps, whose spheres other ranks may have, those of which all may go; they come together where the one is that has the
+/// mass.
+void DeepGranules::leave_out_parts_of_clumps(std::vector<int>& atoms) {
+  const std::size_t owned = static_cast<std::size_t>(bed_.atoms.owned);
+  std::vector<char> goes(owned, 0);
+  for (const int i : atoms) goes[i] = 1;
+  bed_.clump_spheres.all_of(goes);
+  atoms.erase(std::remove_if(atoms.begin(), atoms.end(), [&](int i) { return !goes[i]; }), atoms.end());
+  if (bed_.ranks.count == 1) return;
+  std::vector<int> home(owned, bed_.ranks.count);
+  for (std::size_t i = 0; i < owned; ++i)
+    if (bed_.locked_clumps.find(bed_.atoms.tag[i])) home[i] = bed_.ranks.me;
+  bed_.clump_spheres.unite(home, [](int& one, int other) { one = std::min(one, other); });
+  for (const int i : atoms)
+    if (bed_.shell[i].clump && home[i] != bed_.ranks.me) away_from_home_.push_back({bed_.atoms.tag[i], home[i]});
+}
+
+std::size_t DeepGranules::store(const Occasion& now, const PutAway& put_away) {
+  const bool looks = looks_for_some(now);
+  if (!looks && !bed_.clumps.possible) return 0;
 
   const Surroundings surroundings(*this);
   std::vector<int> deep;
-  stay_near_ = 0;
-  for (int i = bed_.atoms.owned - 1; i >= 0; --i) {
+  if (looks) stay_near_ = 0;
+  for (int i = looks ? bed_.atoms.owned - 1 : -1; i >= 0; --i) {
     // the highest tag must stay an atom: new atoms are numbered from it
     if (!bed_.shell[i].locked || !may_leave_its_walls(i) || bed_.atoms.tag[i] >= now.highest) continue;
     if (surroundings.near(i))
@@ -177,7 +200,10 @@ std::size_t DeepGranules::store(const Occasion& now, const PutAway& put_away) {
   }
   leave_out_near_meshes(deep);
   // where nothing else changes, a few wait for more
-  if (!now.membership_changes && static_cast<double>(deep.size()) < store_share * bed_.atoms.owned) return 0;
+  const bool waits = !now.membership_changes && static_cast<double>(deep.size()) < store_share * bed_.atoms.owned;
+  if (waits) deep.clear();
+  if (bed_.clumps.possible) leave_out_parts_of_clumps(deep);
+  if (waits || !looks) return 0;
   return put_away(deep, [&](int i, const Sphere& there) { return surroundings.near(i, there); });
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "bed.h"
@@ -31,18 +32,28 @@ class DeepGranules {
     bool membership_changes;  ///< atoms come and go for other reasons too; else a few wait for more
     std::int64_t highest;     ///< tag of an atom on any rank
   };
-  /// Returns how many went. Local, after ShellClosure::share().
+  /// A stored sphere of a clump, and the rank that stores the others.
+  struct AwayFromHome {
+    std::int64_t tag;
+    int rank;
+  };
+  /// Those that went since the last time. Local.
+  std::vector<AwayFromHome> take_away_from_home() { return std::exchange(away_from_home_, {}); }
+  /// Returns how many went. Local, after ShellClosure::share(); where there are clumps, collective.
   std::size_t store(const Occasion& now, const PutAway& put_away);
 
  private:
   class Surroundings;
 
+  bool looks_for_some(const Occasion& now);
   bool may_leave_its_walls(int i) const;
+  void leave_out_parts_of_clumps(std::vector<int>& atoms);
   void leave_out_near_meshes(std::vector<int>& atoms) const;
 
   const Bed& bed_;
   const WallSurvey& walls_;
   const ShellClosure& closure_;
+  std::vector<AwayFromHome> away_from_home_;
   bool asked_ = false;              // a look saw interface granules that nothing holds any more
   int builds_without_storing_ = 0;  // since they were last looked for
   std::size_t stay_near_ = 0;       // interface granules that stayed atoms the last time because something is near

@@ -26,7 +26,7 @@ void EffectiveGravity::watch(const ActiveBody& a, const Vec3& g, bool at_once) {
   const WakeUpLaw& law = bed_.scales.wake_up();
   const std::int64_t now = bed_.run.step;
   SolidBody& b = *a.body;
-  const double granules = b.motion.mass() * static_cast<double>(b.mass.count) / b.mass.mass;
+  const double granules = b.granules();
   const auto wakes_if = [&](bool changed) {
     if (changed) bed_.wake.ask_body(a.number);
   };

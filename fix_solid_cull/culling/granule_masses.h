@@ -14,29 +14,42 @@ class GranuleMasses {
 
   /// In the frame of its present body. std::exception for a tag that is not there.
   GranuleMass operator()(std::int64_t tag) const {
-    GranuleMass m;
+    GranuleMass m{};
     int stands_in = 0;
     const bool stored = bed_.solid.store().contains(tag);
     const int* i = stored ? nullptr : bed_.index.find(tag);
     if (stored) {
       const StoredGranule g = bed_.solid.store().get(tag);
-      m = {g.mass, g.position, g.radius, g.held};
+      m = {g.mass, g.position, g.radius, g.held, g.clump_mass()};
       stands_in = g.body;
     } else if (i) {
       const Locked& e = bed_.shell[*i];
-      m = {bed_.atoms.mass[*i], e.place, bed_.atoms.radius[*i], e.held};
+      m = of_atom(*i);
       stands_in = e.body;
     } else {
       const Arrival* a = bed_.arrivals.find(tag);
       if (!a) throw InternalError("granule " + std::to_string(tag) + " is neither an atom nor stored nor announced");
-      m = {a->mass, a->at.position, a->radius, a->held};
-      stands_in = a->at.body;
+      m = a->granule;
+      stands_in = a->body;
     }
     const int body = bed_.solid.bodies().body_of(tag);
     if (body && stands_in != body) {
       const Pose &from = bed_.solid.bodies().pose(stands_in), &to = bed_.solid.bodies().pose(body);
-      if (from != to) m.position = to.to_frame(from.to_world(m.position));
+      if (from != to) {
+        m.position = to.to_frame(from.to_world(m.position));
+        if (m.clump) m.clump = m.clump->seen_from(from, to);
+      }
     }
+    return m;
+  }
+  /// Interface granule i, in the frame of the body in which it stands.
+  GranuleMass of_atom(int i) const {
+    const Locked& e = bed_.shell[i];
+    GranuleMass m{bed_.atoms.mass[i], e.place, bed_.atoms.radius[i], e.held, std::nullopt};
+    if (e.clump == 0) return m;
+    const Clump* const c = bed_.locked_clumps.find(bed_.atoms.tag[i]);
+    m.mass = c ? c->mass : 0;
+    if (c) m.clump = c->lies;
     return m;
   }
   Solid::MassOf by_tag() const {

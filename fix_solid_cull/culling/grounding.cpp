@@ -90,7 +90,7 @@ std::vector<char> Grounding::update() {
   for (const ActiveBody& a : motion_.active()) loads[a.number] = &a;
   FlatMap<int> only_atom;  // of bodies of one granule
   for (const int i : motion_.interface_atoms())
-    if (bed_.solid.bodies().body(bed_.shell[i].body).is_one_granule()) only_atom[bed_.shell[i].body] = i;
+    if (bed_.solid.bodies().body(bed_.shell[i].body).is_one_sphere()) only_atom[bed_.shell[i].body] = i;
   for (auto& [number, body] : bed_.solid.bodies_in_motion()) {
     const int over_ranks = bed_.groups.spanning(number);
     const bool held = over_ranks < 0 ? body.mass.held > 0 : held_over_all[static_cast<std::size_t>(over_ranks)] != 0;
@@ -108,8 +108,7 @@ std::vector<char> Grounding::update() {
     // a body of one granule has moved as the granule alone would: it is culled only now that it stands
     if (one && body.pose != Pose()) {
       bed_.shell.to_world_frame(*one, body.pose);
-      bed_.solid.reframe_one(number,
-                             {bed_.atoms.mass[*one], bed_.shell[*one].place, bed_.atoms.radius[*one], bed_.shell[*one].held});
+      bed_.solid.reframe_one(number, bed_.masses.of_atom(*one));
     }
     bed_.solid.ground(number, true);
   }

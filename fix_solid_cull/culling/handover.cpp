@@ -27,15 +27,22 @@ std::vector<std::int64_t> Handover::stored_elsewhere() {
     }
     at_home_[frame] = {pose};
     bed_.solid.store().for_each_in_box(frame, lo, hi, [&](const Resident& g) {
-      if (!bed_.ranks.owns(bed_.solid.in_world(g))) tags.push_back(g.tag);
+      if (!bed_.ranks.owns(bed_.solid.in_world(g)) && !follows_another(g.tag)) tags.push_back(g.tag);
     });
   });
   std::sort(tags.begin(), tags.end());
   return tags;
 }
 
+/// It is a sphere of a clump, and does not have its mass.
+bool Handover::follows_another(std::int64_t tag) const {
+  if (!bed_.clumps.possible) return false;
+  const StoredGranule g = bed_.solid.store().get(tag);
+  return g.clump && !g.has_clump;
+}
+
 /// What has gone past all neighbours waits for another change, or is lost with its atom.
-bool Handover::find_leaving() {
+bool Handover::find_leaving(const std::vector<DeepGranules::AwayFromHome>& away) {
   bed_.arrivals.clear();
   leaving_.clear();
   if (bed_.ranks.count == 1) return false;
@@ -52,8 +59,20 @@ bool Handover::find_leaving() {
   }
   for (const std::int64_t tag : stored_elsewhere())
     if (Leaving* const to = goes_to(bed_.solid.in_world(*bed_.solid.store().find(tag)))) to->stored.push_back(tag);
+  if (bed_.clumps.possible) keep_clumps_whole(away);
   for (auto& [rank, to] : leaving_) std::sort(to.atoms.begin(), to.atoms.end());
   return !leaving_.empty();
+}
+
+/// A stored clump is where the sphere is that has its mass.
+void Handover::keep_clumps_whole(const std::vector<DeepGranules::AwayFromHome>& away) {
+  for (auto& [rank, to] : leaving_) bed_.solid.add_rest_of_clumps(to.stored);
+  for (const DeepGranules::AwayFromHome& g : away)
+    if (bed_.solid.store().contains(g.tag)) leaving_[g.rank].stored.push_back(g.tag);
+  for (auto& [rank, to] : leaving_) {
+    std::sort(to.stored.begin(), to.stored.end());
+    to.stored.erase(std::unique(to.stored.begin(), to.stored.end()), to.stored.end());
+  }
 }
 
 /// They leave this rank's part of their bodies; contacts with what stays are kept.
@@ -69,7 +88,7 @@ void Handover::leave() {
   leaving.insert(leaving.end(), all.stored.begin(), all.stored.end());
   std::vector<GranuleMass> masses;
   for (const std::int64_t tag : leaving) masses.push_back(bed_.masses(tag));
-  for (const std::int64_t tag : all.atoms) bed_.shell.leaves_rank(bed_.index.at(tag));
+  for (const std::int64_t tag : all.atoms) bed_.leaves_rank(bed_.index.at(tag));
   std::vector<double> record;
   for (const std::int64_t tag : all.stored) bed_.solid.bring_back(tag, record);
   for (std::size_t k = 0; k < leaving.size(); ++k) bed_.solid.unlock(leaving[k], masses[k]);
@@ -99,13 +118,21 @@ void Handover::send_home() {
   parcels_.take_up(parcels);
 }
 
+void Handover::forget_clumps_that_left() {
+  FlatMap<char> here;
+  for (int i = 0; i < bed_.atoms.owned; ++i)
+    if (bed_.shell[i].locked && bed_.shell[i].clump) here[bed_.atoms.tag[i]] = 1;
+  bed_.locked_clumps.forget_all_but([&](std::int64_t tag) { return here.contains(tag); });
+}
+
 std::size_t Handover::take_over() {
   for (int i = 0; i < bed_.atoms.owned; ++i) {
     if (!bed_.shell[i].locked || bed_.shell[i].body != Locked::arriving) continue;
-    const SolidBodies::Place at = bed_.arrivals.take(bed_.atoms.tag[i]).at;
-    bed_.shell.arrives(i, at);
-    bed_.shell.label(i, bed_.groups.key_of(at.body));
+    const Arrival came = bed_.arrivals.take(bed_.atoms.tag[i]);
+    bed_.arrives(i, {came.body, came.granule.position});
+    bed_.shell.label(i, bed_.groups.key_of(came.body));
   }
+  if (bed_.clumps.possible) forget_clumps_that_left();
   const std::vector<LostGranule> missing = bed_.arrivals.take_missing();
   on_the_way_.insert(on_the_way_.end(), missing.begin(), missing.end());
   return missing.size();
@@ -117,8 +144,20 @@ void Handover::remember() {
   const Atoms& atoms = bed_.atoms;
   for (int i = 0; i < atoms.owned; ++i) {
     const Locked& e = bed_.shell[i];
-    if (e.in_body()) before_.push_back({atoms.tag[i], {atoms.mass[i], e.place, atoms.radius[i], e.held}});
+    if (e.in_body()) before_.push_back({atoms.tag[i], bed_.masses.of_atom(i), e.clump});
   }
+}
+
+/// The engine deletes a clump that has lost a sphere.
+void Handover::wake_rest_of_clumps(const std::vector<LostGranule>& lost) {
+  FlatMap<char> clumps;
+  for (const LostGranule& b : lost)
+    if (b.clump) clumps[b.clump] = 1;
+  if (clumps.empty()) return;
+  for (int i = 0; i < bed_.atoms.owned; ++i)
+    if (bed_.shell[i].locked && clumps.contains(bed_.shell[i].clump))
+      bed_.wake.ask(bed_.atoms.place(i), 0.5 * bed_.atoms.radius[i]);
+  bed_.locked_clumps.forget_all_but([&](std::int64_t tag) { return bed_.index.contains(tag); });
 }
 
 bool Handover::forget_lost() {
@@ -134,6 +173,7 @@ bool Handover::forget_lost() {
   }
   if (lost.empty()) return false;
   bed_.index.index(bed_.atoms);
+  if (bed_.clumps.possible) wake_rest_of_clumps(lost);
   for (const LostGranule& b : lost) bed_.solid.unlock(b.tag, b.granule);
   for (const LostGranule& b : lost) bed_.solid.thaw(b.tag);
   bed_.split_bodies();

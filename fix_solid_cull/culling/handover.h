@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bed.h"
+#include "deep_granules.h"
 #include "parcels.h"
 
 namespace solidcull {
@@ -15,8 +16,8 @@ class Handover : public BodyFollower {
  public:
   Handover(Bed& bed, Parcels& parcels) : bed_(bed), parcels_(parcels) {}
 
-  /// At the end of a membership change: whether something here is another rank's. Local.
-  bool find_leaving();
+  /// At the end of a membership change: whether something here is another rank's; so is what `away` says. Local.
+  bool find_leaving(const std::vector<DeepGranules::AwayFromHome>& away);
   /// It goes there; called where something goes on any rank. Collective.
   void send_home();
   /// After the engine's exchange: interface granules that have come find their bodies. Those that were announced and did not
@@ -50,6 +51,10 @@ class Handover : public BodyFollower {
     double way = 0;  // since then, when last looked (m)
     double lag = 0;  // the way of those that have come from other frames without being compared (m)
   };
+  bool follows_another(std::int64_t tag) const;
+  void keep_clumps_whole(const std::vector<DeepGranules::AwayFromHome>& away);
+  void forget_clumps_that_left();
+  void wake_rest_of_clumps(const std::vector<LostGranule>& lost);
   void leave();
 
   Bed& bed_;

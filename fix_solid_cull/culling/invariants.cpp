@@ -76,26 +76,62 @@ void Invariants::check_bodies() const {
     if (!e.locked) continue;
     if (e.body != bodies.body_of(atoms.tag[i]))
       broken("interface granule " + std::to_string(atoms.tag[i]) + " stands in the wrong body");
-    sums[e.body].add(atoms.mass[i], e.place, atoms.radius[i], +1, e.held);
+    const GranuleMass g = bed_.masses.of_atom(i);
+    sums[e.body].add(g, bodies.turning_radius(g.radius));
   }
   store.for_each([&](const Resident& r) {
     const StoredGranule g = store.get(r.tag);
     if (g.body != bodies.body_of(g.tag)) broken("interior granule " + std::to_string(g.tag) + " lies in the wrong body");
     if (store.frame_of(g.body) == GranuleStore::shared_frame && !(bodies.body(g.body).grounded && bodies.pose(g.body) == Pose()))
       broken("body " + std::to_string(g.body) + " moves and lies among those that stand still");
-    sums[g.body].add(g.mass, g.position, g.radius, +1, g.held);
+    sums[g.body].add({g.mass, g.position, g.radius, g.held, g.clump_mass()}, bodies.turning_radius(g.radius));
   });
   for (const auto& [number, sum] : sums) {
     const MassProperties& m = bodies.body(number).mass;
     // both are sums of so many numbers, in another order
     const double rounding = std::max(1e-12, std::numeric_limits<double>::epsilon() * static_cast<double>(sum.count));
     const double places = 1e-9 * bed_.run.edges()[0] + (bed_.scales.compact() ? 1e-7 * bed_.scales.diameter() : 0.0);
-    if (m.count != sum.count || m.held != sum.held || std::abs(m.mass - sum.mass) > rounding * sum.mass ||
-        (m.centre() - sum.centre()).norm() > places)
+    const bool weighs = sum.weighing > 0;  // else the parts on other ranks do
+    if (m.count != sum.count || m.weighing != sum.weighing || m.held != sum.held ||
+        std::abs(m.mass - sum.mass) > rounding * sum.mass || (weighs && (m.centre() - sum.centre()).norm() > places))
       broken("body " + std::to_string(number) + " has other mass properties than its granules: count " +
              std::to_string(m.count - sum.count) + ", held " + std::to_string(m.held - sum.held) + ", mass by " +
              std::to_string((m.mass - sum.mass) / sum.mass * 1e12) + "e-12 of it, centre by " +
              std::to_string((m.centre() - sum.centre()).norm() / bed_.scales.diameter() * 1e9) + "e-9 d");
+  }
+}
+
+/// A clump is stored whole, or all of its spheres are interface granules; one of them has its mass.
+void Invariants::check_clumps() const {
+  struct Seen {
+    int stored = 0, interface_granules = 0, with_mass = 0, spheres = 0;
+  };
+  std::map<int, Seen> clumps;
+  for (int i = 0; i < bed_.atoms.owned; ++i) {
+    const Locked& e = bed_.shell[i];
+    if (!e.locked || e.clump == 0) continue;
+    Seen& c = clumps[e.clump];
+    ++c.interface_granules;
+    c.spheres = e.spheres;
+    c.with_mass += bed_.locked_clumps.find(bed_.atoms.tag[i]) != nullptr;
+    if (bed_.clumps.of(i)) broken("granule " + std::to_string(bed_.atoms.tag[i]) + " is locked and the engine moves its clump");
+  }
+  bed_.solid.store().for_each([&](const Resident& r) {
+    const StoredGranule g = bed_.solid.store().get(r.tag);
+    if (g.clump == 0) return;
+    Seen& c = clumps[g.clump];
+    ++c.stored;
+    c.spheres = g.spheres;
+    c.with_mass += g.has_clump;
+  });
+  for (const auto& [number, c] : clumps) {
+    const bool whole = c.stored == c.spheres && c.interface_granules == 0 && c.with_mass == 1;
+    const bool shell = c.stored == 0 && c.with_mass <= 1 && c.interface_granules <= c.spheres &&
+                       (bed_.ranks.count > 1 || (c.interface_granules == c.spheres && c.with_mass == 1));
+    if (!whole && !shell)
+      broken("of the " + std::to_string(c.spheres) + " spheres of clump " + std::to_string(number) + " " +
+             std::to_string(c.stored) + " are stored and " + std::to_string(c.interface_granules) + " are in the shell, " +
+             std::to_string(c.with_mass) + " with its mass");
   }
 }
 

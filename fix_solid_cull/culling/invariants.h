@@ -15,6 +15,7 @@ class Invariants {
     check_ledger();
     check_bodies();
     check_contacts_across_ranks();
+    if (bed_.clumps.possible) check_clumps();
   }
   static bool asked();
 
@@ -23,6 +24,7 @@ class Invariants {
   void check_ledger() const;
   void check_bodies() const;
   void check_contacts_across_ranks() const;
+  void check_clumps() const;
 
   const Bed& bed_;
 };

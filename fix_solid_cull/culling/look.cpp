@@ -70,7 +70,7 @@ Proposal Look::survey(bool may_cull, bool any_culled) {
     p_.survey.leave_out_unsteady(patience, proposal);
     p_.cover.wake_exposed();
   }
-  if (p_.survey.some_chosen_near(proposal)) p_.survey.tie(proposal);
+  if (p_.survey.some_chosen_near(proposal) || bed_.clumps.possible) p_.survey.tie(proposal);
   p_.meter.see_awake(p_.survey.count_awake(patience, proposal));
   return proposal;
 }

@@ -30,19 +30,24 @@ void MembershipChange::lock(int i) {
 }
 
 void MembershipChange::unlock(int i) {
+  if (const int clump = bed_.shell[i].clump) bed_.clumps.set_clump(i, clump);
   bed_.shell.unlock(bed_.atoms, i);
   p_.survey.note_wake(i);
   p_.closure.unlocked(i);
 }
 
 void MembershipChange::free_what_wakes() {
-  if (wakes_.none()) return;
+  if (wakes_.none() && !bed_.clumps.possible) return;
   std::set<int> whole;  // bodies of this rank that wake as a whole
   for (const auto& b : bed_.solid.bodies().bodies())
     if (wakes_.all || wakes_.wakes_body(b.first)) whole.insert(b.first);
   const Atoms& atoms = bed_.atoms;
+  std::vector<char> wakes(static_cast<std::size_t>(atoms.owned));
   for (int i = 0; i < atoms.owned; ++i)
-    if (bed_.shell[i].locked && (whole.count(bed_.shell[i].body) || wakes_.in_ball(atoms.place(i), 0))) {
+    wakes[i] = bed_.shell[i].locked && (whole.count(bed_.shell[i].body) || wakes_.in_ball(atoms.place(i), 0));
+  bed_.clump_spheres.any_of(wakes);
+  for (int i = 0; i < atoms.owned; ++i)
+    if (wakes[i]) {
       unlock(i);
       changes_.freed.push_back(atoms.tag[i]);
     }
@@ -52,12 +57,14 @@ void MembershipChange::free_what_wakes() {
     bed_.stored.for_each_in_box(b.centre - Vec3::Constant(b.radius), b.centre + Vec3::Constant(b.radius), [&](const Resident& g) {
       if (!whole.count(g.body) && b.holds(bed_.solid.nearest_image(bed_.solid.in_world(g), b.centre), 0)) stored.push_back(g.tag);
     });
+  if (bed_.clumps.possible) bed_.solid.add_rest_of_clumps(stored);
   std::sort(stored.begin(), stored.end());
   stored.erase(std::unique(stored.begin(), stored.end()), stored.end());
   for (const std::int64_t tag : stored) {
     unlock(p_.exchange.bring_back(tag));
     changes_.freed.push_back(tag);
   }
+  if (bed_.clumps.possible) p_.exchange.join_images(stored);
   for (const std::int64_t tag : changes_.freed) changes_.freed_anywhere[tag] = 1;
 }
 
@@ -71,13 +78,58 @@ bool MembershipChange::still_rests(int i) const {
 }
 
 void MembershipChange::lock_what_was_chosen() {
+  std::vector<char> locks(static_cast<std::size_t>(bed_.atoms.owned), 0);
+  for (const std::int64_t tag : proposal_.chosen)
+    // it may have left this rank or the simulation, too, or something wakes beside it
+    if (const int* i = bed_.index.find(tag))
+      locks[*i] = !bed_.shell[*i].locked && !wakes_.in_ball(bed_.atoms.place(*i), bed_.scales.diameter()) && still_rests(*i);
+  bed_.clump_spheres.all_of(locks);
+  std::vector<int> of_clumps;
   for (const std::int64_t tag : proposal_.chosen) {
     const int* i = bed_.index.find(tag);
-    // it may have left this rank or the simulation, too, or something wakes beside it
-    if (!i || bed_.shell[*i].locked || wakes_.in_ball(bed_.atoms.place(*i), bed_.scales.diameter()) || !still_rests(*i)) continue;
+    if (!i || !locks[*i]) continue;
+    if (bed_.clumps.of(*i)) of_clumps.push_back(*i);
     lock(*i);
     changes_.locked.push_back(tag);
     changes_.locked_anywhere[tag] = 1;
+  }
+  if (bed_.clumps.possible) lock_clumps(of_clumps);
+}
+
+/// Their spheres are granules of their own to the engine from here on, and tied to the one with the lowest tag, which has what
+/// was known of the clump.
+void MembershipChange::lock_clumps(const std::vector<int>& locked) {
+  const Atoms& atoms = bed_.atoms;
+  struct Spheres {
+    std::int64_t first;  // the lowest tag
+    int count;
+  };
+  std::vector<Spheres> spheres(static_cast<std::size_t>(atoms.owned), Spheres{0, 0});
+  for (const int i : locked) {
+    bed_.shell.set_clump(i, bed_.clumps.of(i), 0);
+    spheres[i] = {atoms.tag[i], 1};
+  }
+  bed_.clump_spheres.unite(spheres, [](Spheres& one, const Spheres& other) {
+    if (other.count == 0) return;
+    one.first = one.count ? std::min(one.first, other.first) : other.first;
+    one.count += other.count;
+  });
+  std::vector<std::pair<int, int>> whole;  // clumps whose first sphere is here
+  for (const int i : locked) {
+    const Spheres& s = spheres[i];
+    if (s.first == atoms.tag[i])
+      whole.emplace_back(bed_.shell[i].clump, i);
+    else
+      changes_.joins.push_back({triple(atoms.place(i)), atoms.tag[i], s.first});
+    bed_.shell.set_clump(i, bed_.shell[i].clump, s.count);
+    bed_.clumps.set_clump(i, 0);
+  }
+  std::vector<Clump> clumps = bed_.clump_spheres.take(whole);
+  for (std::size_t k = 0; k < whole.size(); ++k) {
+    const int i = whole[k].second;
+    Clump& c = clumps[k];
+    c.lies.centre = bed_.solid.nearest_image(c.lies.centre, atoms.place(i));
+    bed_.locked_clumps.put(atoms.tag[i], std::move(c));
   }
 }
 
@@ -94,7 +146,7 @@ void MembershipChange::tell_neighbours() {
   };
   tell(changes_.freed, false);
   tell(changes_.locked, true);
-  const double reach = contact_reach(bed_);
+  const double reach = std::max(contact_reach(bed_), bed_.clump_spheres.reach());
   for (const Row& r : bed_.ranks.exchange(rows, reach))
     (r.locked ? changes_.locked_anywhere : changes_.freed_anywhere)[r.tag] = 1;
   const std::vector<Join> joins = bed_.ranks.exchange(changes_.joins, reach);
@@ -115,6 +167,9 @@ void MembershipChange::change_bodies() {
 /// Contacts go back to the engine.
 void MembershipChange::thaw_and_unlock() {
   p_.freezing.thaw(changes_);
+  if (bed_.clumps.possible)  // what has mass goes last
+    std::stable_partition(changes_.freed.begin(), changes_.freed.end(),
+                          [&](std::int64_t tag) { return bed_.locked_clumps.find(tag) == nullptr; });
   for (const std::int64_t tag : changes_.freed) leave_body(tag);
   changes_.freed_anywhere.for_each([&](std::int64_t tag, char) { bed_.solid.thaw(tag); });
   bed_.split_bodies();
@@ -134,14 +189,28 @@ void MembershipChange::leave_body(std::int64_t tag) {
   const Twist twist = bed_.solid.bodies().body(body).twist;
   atoms.set_velocity(i, back ? bed_.shell[i].velocity : twist.at(x));
   if (bed_.contacts.turn_granules) atoms.set_spin(i, back ? bed_.shell[i].spin : twist.spin);
-  const double radius = bed_.solid.bodies().turning_radius(atoms.radius[i]);
-  const MovingGranule given{atoms.mass[i], atoms.radius[i], x, atoms.velocity(i), atoms.spin(i)};
+  const GranuleMass mass = bed_.masses(tag);
+  MovingGranule given{mass.mass, mass.radius, x, atoms.velocity(i), atoms.spin(i)};
+  if (mass.clump) give_clump_back(i, body, back, given);
   const double before = bed_.solid.kinetic_energy(body);
-  bed_.solid.unlock(tag, bed_.masses(tag), back ? &given : nullptr);
-  const double after =
-      bed_.solid.kinetic_energy(body) + RigidPart::granule(given.mass, radius, x, given.velocity, given.spin).kinetic_energy();
-  bed_.solid.count_restored(after - before);
+  bed_.solid.unlock(tag, mass, back ? &given : nullptr);
+  const double radius = bed_.solid.bodies().turning_radius(given.radius);
+  const RigidPart free =
+      given.clump ? bed_.solid.bodies().part_of(given) : RigidPart::granule(given.mass, radius, x, given.velocity, given.spin);
+  bed_.solid.count_restored(bed_.solid.kinetic_energy(body) + free.kinetic_energy() - before);
   bed_.solid.thaw(tag);
+}
+
+/// The engine moves the clump again whose mass the sphere has: with the motion that it had, or that of its body.
+void MembershipChange::give_clump_back(int sphere, int body, bool as_it_was, MovingGranule& given) {
+  Clump c = bed_.locked_clumps.take(bed_.atoms.tag[sphere]);
+  c.lies = c.lies.in_world(bed_.solid.bodies().pose(body));
+  const Twist& twist = bed_.solid.bodies().body(body).twist;
+  if (!as_it_was) c.move_as(twist.at(c.lies.centre), twist.spin);
+  given.velocity = c.velocity;
+  given.spin = c.spin();
+  given.clump = c.lies;
+  bed_.clumps.put(c, sphere);
 }
 
 void MembershipChange::freeze_and_lock() {
@@ -155,8 +224,23 @@ void MembershipChange::lock_into_body(std::int64_t tag) {
   const Atoms& atoms = bed_.atoms;
   const Locked& e = bed_.shell[i];
   // it has the motion that it had before it was locked
-  const MovingGranule granule{atoms.mass[i], atoms.radius[i], atoms.place(i), e.velocity, e.spin, e.held};
-  bed_.shell.set_place(i, bed_.solid.lock(tag, granule, bed_.masses.by_tag()));
+  MovingGranule granule{atoms.mass[i], atoms.radius[i], atoms.place(i), e.velocity, e.spin, e.held, std::nullopt};
+  if (e.clump) {
+    const Clump* const c = bed_.locked_clumps.find(tag);
+    granule.mass = c ? c->mass : 0;
+    if (c) {
+      granule.velocity = c->velocity;
+      granule.spin = c->spin();
+      granule.clump = c->lies;
+    }
+  }
+  const SolidBodies::Place at = bed_.solid.lock(tag, granule, bed_.masses.by_tag());
+  bed_.shell.set_place(i, at);
+  if (granule.clump) {
+    const Pose& pose = bed_.solid.bodies().pose(at.body);
+    bed_.locked_clumps.shift(tag, pose.to_world(at.position) - atoms.place(i));  // it may stand in another periodic image
+    bed_.locked_clumps.to_frame(tag, pose);
+  }
 }
 
 /// From neighbour to neighbour, so that what hangs together becomes one body without many that merge.

@@ -47,6 +47,8 @@ class MembershipChange {
   void tell_neighbours();
   void lock(int i);
   void unlock(int i);
+  void lock_clumps(const std::vector<int>& locked);
+  void give_clump_back(int sphere, int body, bool as_it_was, MovingGranule& given);
   bool still_rests(int i) const;
   void thaw_and_unlock();
   void leave_body(std::int64_t tag);

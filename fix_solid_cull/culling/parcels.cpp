@@ -244,7 +244,7 @@ void Parcels::take_as_it_was(const Parcel& p) {
     const int body = number_.at(static_cast<std::size_t>(g.body));
     if (!g.record) {
       bed_.solid.take_in(g.tag, body, {g.position, g.radius});
-      bed_.shell.arrives(bed_.index.at(g.tag), {body, g.position});
+      bed_.arrives(bed_.index.at(g.tag), {body, g.position});
       continue;
     }
     StoredGranule s = locked_before(g);
@@ -293,22 +293,31 @@ void Parcels::take_granule(std::int64_t tag, const Taken& t) {
   const Parcel::Granule& g = *t.granule;
   const SolidBody& from = t.parcel->sender->bodies.at(g.body);
   const Vec3 x = from.pose.to_world(g.position);
-  const SolidBodies::Place at =
-      bed_.solid.lock(tag, {g.mass, g.radius, x, from.twist.at(x), from.twist.spin, g.held}, bed_.masses.by_tag());
+  MovingGranule moving{g.mass, g.radius, x, from.twist.at(x), from.twist.spin, g.held, g.clump_mass()};
+  if (moving.clump) {
+    moving.clump = moving.clump->in_world(from.pose);
+    moving.velocity = from.twist.at(moving.clump->centre);
+  }
+  const SolidBodies::Place at = bed_.solid.lock(tag, moving, bed_.masses.by_tag());
   SolidBody& to = bed_.solid.body(at.body);
   to.feel_as(from);
+  if (moving.clump) {
+    moving.clump->centre += to.pose.to_world(at.position) - x;  // it may stand in another periodic image now
+    moving.clump = moving.clump->in_frame(to.pose);
+  }
   const int* i = bed_.index.find(tag);
   if (g.record) {
     StoredGranule s = locked_before(g);
+    if (moving.clump) s.of_clump = *moving.clump;
     s.position = at.position;
     s.body = at.body;
     s.load_change = to.pose.turned_to_frame(from.pose.turned_to_world(s.load_change));
     bed_.solid.add_stored(bed_.solid.as_stored(s), g.record, g.length);
     bed_.solid.add_wall_loads(tag, at.body, g.wall_loads);
   } else if (i && bed_.shell[*i].body == 0) {
-    bed_.shell.arrives(*i, at);
+    bed_.arrives(*i, at);
   } else {
-    bed_.arrivals.announce(tag, {at, g.mass, g.radius, g.held});
+    bed_.arrivals.announce(tag, {at.body, {g.mass, at.position, g.radius, g.held, moving.clump}, g.clump});
   }
 }
 
@@ -321,7 +330,7 @@ void Parcels::take(const Parcel* parcels, std::size_t n) {
       const int* i = bed_.index.find(g.tag);
       const bool here = i && bed_.shell[*i].locked && bed_.shell[*i].body == 0;  // an interface granule of a restart file
       if (!bed_.solid.bodies().body_of(g.tag) &&
-          (here || p.for_this_rank || bed_.ranks.owns(p.sender->bodies.at(g.body).pose.to_world(g.position))))
+          (here || p.for_this_rank || bed_.ranks.owns(p.sender->bodies.at(g.body).pose.to_world(g.home()))))
         taken.emplace(g.tag, Taken{&p, &g});
     }
   }

@@ -1,7 +1,8 @@
-// All that the culling asks of an engine: seven small ports (proxies). An engine implements them once; the tests have a small
+// All that the culling asks of an engine: eight small ports (proxies). An engine implements them once; the tests have a small
 // world in memory that does (tests/unit/small_world.h). SI units; world frame.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "box.h"
+#include "clump_mass.h"
 #include "frozen_wall_loads.h"
 #include "internal_error.h"
 #include "sphere.h"
@@ -74,7 +76,8 @@ class Atoms {
   };
   Ways ways;
 
-  /// An integrator moves it, all the gravity there is pulls it, and nothing else holds or drives it.
+  /// An integrator moves it, all the gravity there is pulls it, and nothing else holds or drives it. Clumps are moved whatever
+  /// their groups.
   bool may_be_culled(int i) const { return groups_may_be_culled(groups[i]) && !ways.hold(i); }
   bool groups_may_be_culled(int g) const {
     return (g & own_bit) && (g & movable_bits) && !(g & held_bits) && (g & gravity_bits) == gravity_bits;
@@ -111,6 +114,55 @@ class Atoms {
   /// So many more atoms, over all ranks, have come out of the store as publish_counts() has told: until then. Local.
   virtual void count_more(std::int64_t returned) = 0;
   virtual void sort_soon() = 0;  ///< many atoms are new: the engine should sort them
+};
+
+/// A clump as the engine moves it: a rigid granule of several spheres. World frame.
+struct Clump {
+  int number = 0, spheres = 0;
+  double mass = 0;  ///< kg
+  ClumpMass lies{Vec3::Zero(), Eigen::Quaterniond::Identity(), Vec3::Zero()};
+  Vec3 velocity = Vec3::Zero();          ///< of its centre of mass (m/s)
+  Vec3 angular_momentum = Vec3::Zero();  ///< about that (kg m^2/s)
+  std::vector<double> rest;              ///< what the engine keeps of it besides
+
+  Vec3 spin() const { return lies.turn * (lies.turn.conjugate() * angular_momentum).cwiseQuotient(lies.inertia); }
+  void move_as(const Vec3& its_velocity, const Vec3& its_spin) {
+    velocity = its_velocity;
+    angular_momentum = lies.tensor() * its_spin;
+  }
+  double kinetic_energy() const { return 0.5 * mass * velocity.squaredNorm() + 0.5 * spin().dot(angular_momentum); }
+};
+
+/// Granules of several spheres. Each sphere is an atom, with the mass of the whole clump; one rank, near its spheres, moves the
+/// clump. Local.
+class Clumps {
+ public:
+  virtual ~Clumps() = default;
+
+  bool possible = false;         ///< there may be some in this deck; all ranks say the same
+  const int* of_atom = nullptr;  ///< number of the clump that an atom, owned or ghost, is a sphere of; below 1: of none
+  int rest_size = 0;             ///< of Clump::rest
+
+  int of(int i) const { return possible ? std::max(of_atom[i], 0) : 0; }
+  /// The clumps that this rank moves: how many, and one of them; the one with this number, if it is here.
+  virtual int count() const = 0;
+  virtual Clump clump(int k) const = 0;
+  virtual int find(int number) const = 0;  ///< which of them it is; -1: none
+  /// Farthest that spheres of a clump may be apart, centre to centre (m), of any that this rank has ever moved or was told of.
+  virtual double largest() const = 0;
+  virtual void know_largest(double apart) = 0;
+  /// No clump that is made from here on gets a number up to the highest that there was, or that was told.
+  virtual int highest_number() const = 0;
+  virtual void keep_number(int number) = 0;
+  // --- only while membership changes
+  /// The engine moves it no more, and knows it no more. Which of them comes under another number may change.
+  virtual Clump take(int number) = 0;
+  /// It moves it again, with these spheres on any rank; atom `sphere`, which is here, says which periodic image it is in.
+  virtual void put(const Clump& clump, int sphere) = 0;
+  /// Owned atom i is a sphere of this clump from here on; 0: a granule of its own.
+  virtual void set_clump(int i, int number) = 0;
+  /// Owned atom i is in the periodic image in which it is nearest to owned atom `to`, a sphere of the same clump.
+  virtual void join_image(int i, int to) = 0;
 };
 
 /// Neighbour pairs as rows: partner k of owned atom `row[r]` is partners[row[r]][k] & mask. Each pair of owned atoms stands once,
@@ -418,6 +470,7 @@ class Memory {
 
 struct Ports {
   Atoms& atoms;
+  Clumps& clumps;
   Contacts& contacts;
   Walls& walls;
   Insertions& insertions;

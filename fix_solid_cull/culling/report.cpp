@@ -58,6 +58,14 @@ void Report::count_totals() {
   spent_ = {sums[11], sums[12], sums[13]};
 }
 
+namespace {
+
+RigidPart of_clump(const ClumpMass& c, double mass, const Twist& twist) {
+  return {mass, c.centre, c.tensor(), twist.at(c.centre), twist.spin};
+}
+
+}  // namespace
+
 /// What interior granules carry, so that a deck can add it to what its atoms have: momentum, angular momentum about the origin,
 /// kinetic energy, and their centre of mass.
 void Report::sum_carried() {
@@ -66,9 +74,14 @@ void Report::sum_carried() {
   if (bed_.solid.has_store())
     bed_.solid.store().for_each([&](const Resident& g) {
       const Twist& twist = bed_.solid.bodies().body(g.body).twist;
-      const Vec3 x = bed_.solid.in_world(g);
-      const double m = bed_.solid.store().get(g.tag).mass;
-      const RigidPart p = RigidPart::granule(m, g.radius, x, twist.at(x), twist.spin);
+      const StoredGranule stored = bed_.solid.store().get(g.tag);
+      const double m = stored.mass;
+      Vec3 x = bed_.solid.in_world(g);
+      RigidPart p = RigidPart::granule(m, g.radius, x, twist.at(x), twist.spin);
+      if (stored.has_clump) {
+        p = of_clump(stored.of_clump.in_world(bed_.solid.bodies().pose(g.body)), m, twist);
+        x = p.centre;
+      }
       mass += m;
       momentum += m * p.velocity;
       turning += p.angular_momentum(Vec3::Zero());
@@ -85,21 +98,40 @@ void Report::sum_carried() {
 /// them.
 void Report::sum_all() {
   double sums[6] = {};
-  const auto add = [&](double mass, double radius, const Vec3& x, const Vec3& v, const Vec3& spin) {
-    const RigidPart p = RigidPart::granule(mass, radius, x, v, spin);
-    const double of_centre = 0.5 * mass * v.squaredNorm();
-    sums[0] += mass;
-    for (int d = 0; d < 3; ++d) sums[1 + d] += mass * x[d];
+  const auto add_part = [&](const RigidPart& p, const Vec3& x) {
+    const double of_centre = 0.5 * p.mass * p.velocity.squaredNorm();
+    sums[0] += p.mass;
+    for (int d = 0; d < 3; ++d) sums[1 + d] += p.mass * x[d];
     sums[4] += of_centre;
     sums[5] += p.kinetic_energy() - of_centre;
   };
+  const auto add = [&](double mass, double radius, const Vec3& x, const Vec3& v, const Vec3& spin) {
+    add_part(RigidPart::granule(mass, radius, x, v, spin), x);
+  };
+  const auto add_clump = [&](const ClumpMass& in_frame, double mass, int body) {
+    const RigidPart p = of_clump(in_frame.in_world(bed_.solid.bodies().pose(body)), mass, bed_.solid.bodies().body(body).twist);
+    add_part(p, bed_.run.wrapped(p.centre));
+  };
   const Atoms& atoms = bed_.atoms;
-  for (int i = 0; i < atoms.owned; ++i) add(atoms.mass[i], atoms.radius[i], atoms.place(i), atoms.velocity(i), atoms.spin(i));
+  for (int i = 0; i < atoms.owned; ++i)
+    if (bed_.clump_spheres.of(i) == 0) add(atoms.mass[i], atoms.radius[i], atoms.place(i), atoms.velocity(i), atoms.spin(i));
+  if (bed_.clumps.possible) {
+    for (int k = 0; k < bed_.clumps.count(); ++k) {
+      const Clump c = bed_.clumps.clump(k);
+      add_part({c.mass, c.lies.centre, c.lies.tensor(), c.velocity, c.spin()}, bed_.run.wrapped(c.lies.centre));
+    }
+    for (int i = 0; i < atoms.owned; ++i)
+      if (const Clump* c = bed_.shell[i].in_body() ? bed_.locked_clumps.find(atoms.tag[i]) : nullptr)
+        add_clump(c->lies, c->mass, bed_.shell[i].body);
+  }
   if (bed_.solid.has_store())
     bed_.solid.store().for_each([&](const Resident& g) {
+      const StoredGranule stored = bed_.solid.store().get(g.tag);
+      if (stored.has_clump) return add_clump(stored.of_clump, stored.mass, g.body);
+      if (stored.clump) return;
       const Twist& twist = bed_.solid.bodies().body(g.body).twist;
       const Vec3 x = bed_.solid.in_world(g);
-      add(bed_.solid.store().get(g.tag).mass, g.radius, bed_.run.wrapped(x), twist.at(x), twist.spin);
+      add(stored.mass, g.radius, bed_.run.wrapped(x), twist.at(x), twist.spin);
     });
   bed_.ranks.sum(sums, 6);
   for (int d = 1; d < 4; ++d) sums[d] = sums[0] > 0 ? sums[d] / sums[0] : 0.0;

@@ -18,7 +18,7 @@ std::uint64_t whole(std::int64_t x) { return static_cast<std::uint64_t>(x); }
 enum PartColumn { own_lo = 0, own_hi = 3, observer = 6, observed_then = 13, places_lo = 20, places_hi = 23, part_columns = 26 };
 enum ContactColumn { c_low, c_high, c_body, c_known, c_history };
 enum GranuleColumn { g_tag, g_body, g_numbers };
-static_assert(int{g_numbers} == chunk_columns::granule_place && int{c_history} == chunk_columns::history, "the same columns");
+static_assert(int{c_history} == chunk_columns::history, "the same columns");
 
 std::uint64_t word(double x) { return bits_of(x); }
 template <class Whole>
@@ -74,6 +74,13 @@ std::size_t index_below(std::uint64_t x, std::size_t n) {
 }
 
 }  // namespace
+
+Vec3 granule_home(const std::uint64_t* row) {
+  StoredGranule g;
+  const std::uint64_t* at = row + g_numbers;
+  g.each_number([&](auto& x) { read(x, *at++); });
+  return g.home();
+}
 
 // ------------------------------------------------------------------------------------------------------------ tables
 
@@ -261,7 +268,8 @@ void ChunkSource::interface_block(SectionChunk& chunk) {
 
 void ChunkSource::interior_block(SectionChunk& chunk) {
   begin_block();
-  const auto add = [&](const StoredGranule& g, const std::uint64_t* record, int length) {
+  const auto add = [&](StoredGranule g, const std::uint64_t* record, int length) {
+    if (g.clump && !g.has_clump) g.of_clump.centre = bed_.solid.home_of(g.tag);
     const auto known = by_length_.emplace(length, tables_.interior.size());
     if (known.second) {
       tables_.interior.emplace_back();

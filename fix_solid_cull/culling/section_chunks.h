@@ -31,9 +31,12 @@ struct ChunkTables {
 
 /// What others must know of the columns of these tables.
 namespace chunk_columns {
-constexpr std::size_t granule_tag = 0, granule_body = 1, granule_place = 2;  // three words, frame of the body
+constexpr std::size_t granule_tag = 0, granule_body = 1;
 constexpr std::size_t low = 0, high = 1, contact_body = 2, known = 3, history = 4;
 }  // namespace chunk_columns
+
+/// Of a row of interface or interior granules: see StoredGranule::home().
+Vec3 granule_home(const std::uint64_t* row);
 
 /// Gives the chunks of this rank one by one. Nothing may change meanwhile. Local.
 class ChunkSource {

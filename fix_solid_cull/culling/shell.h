@@ -31,16 +31,17 @@ struct Locked {
   double excess = 0;                ///< largest load change over tolerance since it was last asked
   std::int64_t lock_step = -1;
   std::int64_t came_back = -1;                        ///< step in which it came out of the store
+  int clump = 0, spheres = 0;                         ///< number of the clump that it is a sphere of, and of how many; 0: none
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< at locking, given back only if no step has passed
 
   bool in_body() const { return locked && body > 0; }
 
-  static constexpr int packed_size = 18;
+  static constexpr int packed_size = 20;
   void pack(double* to) const {
     const double values[packed_size] = {double(locked), double(fresh),     double(held),   reference[0],   reference[1],
                                         reference[2],   load_change[0],    load_change[1], load_change[2], normal_load,
                                         excess,         double(lock_step), velocity[0],    velocity[1],    velocity[2],
-                                        spin[0],        spin[1],           spin[2]};
+                                        spin[0],        spin[1],           spin[2],        double(clump),  double(spheres)};
     std::copy_n(values, packed_size, to);
   }
   static Locked unpack(const double* v) {
@@ -55,6 +56,8 @@ struct Locked {
     l.lock_step = static_cast<std::int64_t>(v[11]);
     l.velocity = vec(v + 12);
     l.spin = vec(v + 15);
+    l.clump = static_cast<int>(v[18]);
+    l.spheres = static_cast<int>(v[19]);
     return l;
   }
 };
@@ -73,6 +76,7 @@ class Shell : public FollowsAtoms {
   /// Owned atom i is locked in this step, with the motion that it has; `normal_load`: what its contacts press with (N).
   void lock(Atoms& atoms, int i, std::int64_t step, double normal_load, bool held) {
     Locked& e = changed(i);
+    e.clump = e.spheres = 0;
     e.locked = e.fresh = true;
     e.load_change = Vec3::Zero();
     e.normal_load = normal_load;
@@ -92,8 +96,14 @@ class Shell : public FollowsAtoms {
     atoms.mark_interface(i, false);
     labels_[i] = 0;
   }
+  /// It is a sphere of this clump, of so many.
+  void set_clump(int i, int number, int spheres) {
+    rows_[i].clump = number;
+    rows_[i].spheres = spheres;
+  }
   void left_body(int i) {
     Locked& e = changed(i);
+    e.clump = e.spheres = 0;
     e.lock_step = -1;
     e.body = 0;
     e.held = false;
@@ -108,6 +118,8 @@ class Shell : public FollowsAtoms {
     e.load_change = g.load_change;
     e.normal_load = g.normal_load;
     e.held = g.held;
+    e.clump = g.clump;
+    e.spheres = g.spheres;
     e.came_back = step;
     e.lock_step = lock_step;
     e.velocity = atoms.velocity(i);
@@ -169,6 +181,8 @@ class Shell : public FollowsAtoms {
     if (square > e.excess * e.excess * tolerance * tolerance) e.excess = std::sqrt(square) / tolerance;
     return e.excess;
   }
+  /// What its granule as a whole has had, if that is more.
+  void raise_excess(int i, double excess) { rows_[i].excess = std::max(rows_[i].excess, excess); }
   double take_excess(int i) {
     const double excess = rows_[i].excess;
     rows_[i].excess = 0;

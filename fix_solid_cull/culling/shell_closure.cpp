@@ -264,8 +264,15 @@ std::size_t ShellClosure::fetch_what_is_near() {
   find_near_walls(near);
   for (const Box& box : opened(bed_.run.skin))
     bed_.stored.for_each_in_box(box.lo, box.hi, [&](const Resident& g) { near.insert(g.tag); });
-  for (const std::int64_t tag : near) exchange_.bring_back(tag);
-  return near.size();
+  return fetch({near.begin(), near.end()});
+}
+
+/// With the other spheres of their clumps.
+std::size_t ShellClosure::fetch(std::vector<std::int64_t> tags) {
+  if (bed_.clumps.possible) bed_.solid.add_rest_of_clumps(tags);
+  for (const std::int64_t tag : tags) exchange_.bring_back(tag);
+  if (bed_.clumps.possible) exchange_.join_images(tags);
+  return tags.size();
 }
 
 std::vector<Box> ShellClosure::opened(double gap) const {
@@ -292,8 +299,7 @@ std::size_t ShellClosure::fetch_from_outside() {
       if (outside(bed_.solid.in_world(g), 0)) leaving.push_back(g.tag);
     });
   });
-  for (const std::int64_t tag : leaving) exchange_.bring_back(tag);
-  return leaving.size();
+  return fetch(std::move(leaving));
 }
 
 void ShellClosure::release_memory() { release(foreign_); }

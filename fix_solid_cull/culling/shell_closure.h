@@ -102,6 +102,7 @@ class ShellClosure : public BodyFollower {
   };
 
   bool is_clear(int i) const;
+  std::size_t fetch(std::vector<std::int64_t> tags);
   std::vector<Visitor> visitors(const Frames& frames) const;
   void find_near_granules(std::set<std::int64_t>& near);
   void find_near_walls(std::set<std::int64_t>& near);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "clump_numbers.h"
+#include "store_exchange.h"
 #include "word_sum.h"
 
 namespace solidcull {
@@ -33,9 +35,34 @@ void ShownBed::show() {
   names_.assign(static_cast<std::size_t>(bed_.atoms.room), Name());
   granules_.clear();
   interface_.clear();
+  clumps_.clear();
+  spheres_.clear();
   shown_ = true;
   show_interface();
   show_stored();
+  if (bed_.clumps.possible) join_images();
+}
+
+/// The engine has it as it would be now.
+void ShownBed::show_clump(int sphere, std::int64_t tag, Clump c, int body, bool as_it_was) {
+  c.lies = c.lies.in_world(bed_.solid.bodies().pose(body));
+  const Twist& twist = bed_.solid.bodies().body(body).twist;
+  if (!as_it_was) c.move_as(twist.at(c.lies.centre), twist.spin);
+  bed_.clumps.put(c, sphere);
+  std::vector<double> numbers;
+  solidcull::pack(bed_.clumps.clump(bed_.clumps.find(c.number)), numbers);
+  clumps_[c.number] = {tag, granules_.size() - 1, std::move(numbers)};
+}
+
+/// Spheres of a clump that was stored are in the periodic image in which its centre is.
+void ShownBed::join_images() {
+  FlatMap<int> first;
+  for (const auto& [i, clump] : spheres_)
+    if (clumps_.at(clump).tag == bed_.atoms.tag[i]) first[clump] = i;
+  for (const auto& [i, clump] : spheres_) {
+    if (const int* to = first.find(clump)) bed_.clumps.join_image(i, *to);
+    bed_.clumps.set_clump(i, clump);
+  }
 }
 
 void ShownBed::show_interface() {
@@ -49,6 +76,10 @@ void ShownBed::show_interface() {
       if (bed_.contacts.turn_granules) atoms.set_spin(i, e.spin);
     }
     note(i, false, 0);
+    if (e.clump == 0) continue;
+    bed_.clumps.set_clump(i, e.clump);
+    if (const Clump* c = bed_.locked_clumps.find(atoms.tag[i]))
+      show_clump(i, atoms.tag[i], *c, e.body, e.lock_step == bed_.run.step);
   }
 }
 
@@ -70,6 +101,8 @@ void ShownBed::show_stored() {
     bed_.shell.label(i, bed_.groups.key_of(g.body));
     note(i, true, sum_of(record));
     atoms.mark_interface(i, false);
+    if (g.clump) spheres_.emplace_back(i, g.clump);
+    if (g.has_clump) show_clump(i, g.tag, StoreExchange::clump_of(record, g), g.body, transient_known);
   });
 }
 
@@ -83,7 +116,7 @@ void ShownBed::note(int i, bool stored, std::uint64_t sum) {
 void ShownBed::stand_in_for_missing(Arrivals& arrivals) const {
   for (std::size_t k = 0; k < interface_.size(); ++k) {
     const Locked& e = interface_[k].state;
-    arrivals.announce(granules_[k].tag, {{e.body, e.place}, granules_[k].mass, granules_[k].radius, e.held});
+    arrivals.announce(granules_[k].tag, {e.body, {granules_[k].mass, e.place, granules_[k].radius, e.held, std::nullopt}});
   }
 }
 
@@ -165,6 +198,7 @@ void ShownBed::hide() {
   groups_of_guests_ = 0;
   std::vector<int> at(granules_.size(), gone);
   bring_strangers_home(at);
+  if (bed_.clumps.possible) take_clumps(at);
   for (std::size_t k = 0; k < granules_.size(); ++k) judge(k, at[k]);
 
   std::vector<int> guests;
@@ -173,7 +207,7 @@ void ShownBed::hide() {
   std::sort(guests.rbegin(), guests.rend());
   for (const int i : guests) atoms.take_out(i);
 
-  changed_ = bed_.ranks.any(!changes_.empty());
+  changed_ = bed_.ranks.any(!changes_.empty() || !changed_clumps_.empty());
   bed_.wake.ask_many(bed_.ranks, asking_, bed_.scales.wake_up(), bed_.solid.locked());
   shown_ = false;
   if (granules_.capacity() < worth_freeing) return;
@@ -181,6 +215,29 @@ void ShownBed::hide() {
   granules_ = {};
   interface_ = {};
   asking_ = {};
+}
+
+/// Those that stay culled are no clumps to the engine; what the deck did to one wakes it.
+void ShownBed::take_clumps(const std::vector<int>& at) {
+  changed_clumps_.clear();
+  for (std::size_t k = 0; k < granules_.size(); ++k)
+    if (at[k] != gone) bed_.clumps.set_clump(at[k], 0);
+  std::vector<std::pair<int, int>> asked;
+  for (const auto& [number, c] : clumps_) {
+    if (at[c.number] != gone)
+      asked.emplace_back(number, at[c.number]);
+    else if (bed_.clumps.find(number) >= 0)
+      bed_.clumps.take(number);
+  }
+  std::vector<double> numbers;
+  for (Clump& c : bed_.clump_spheres.take(asked)) {
+    const ShownClump& then = clumps_.at(c.number);
+    numbers.clear();
+    solidcull::pack(c, numbers);
+    if (numbers == then.numbers) continue;
+    asking_.push_back(granules_[then.number].place);
+    changed_clumps_[c.number] = std::move(c);
+  }
 }
 
 /// A command may have sent granules to other ranks; they go back to where their bodies are.
@@ -225,6 +282,15 @@ bool ShownBed::is_as_shown(const Shown& s, int i) const {
          atoms.mass[i] == s.mass && atoms.type[i] == s.type;
 }
 
+/// The engine has them elsewhere.
+void ShownBed::add_numbers_of_clump(std::int64_t tag) {
+  if (!bed_.solid.store().get(tag).has_clump) return;
+  std::vector<double> stored;
+  bed_.solid.store().record(tag, stored);
+  record_.insert(record_.end(), stored.end() - static_cast<std::ptrdiff_t>(StoreExchange::numbers_of_clump(stored)),
+                 stored.end());
+}
+
 /// What became of a granule, which is atom i.
 void ShownBed::judge(std::size_t number, int i) {
   const Shown& s = granules_[number];
@@ -247,6 +313,7 @@ void ShownBed::judge(std::size_t number, int i) {
   if (changed || s.stored) {
     int layout = 0;
     atoms.pack(i, record_, layout);
+    if (s.stored && bed_.clumps.possible) add_numbers_of_clump(s.tag);
     if (changed)
       changes_[s.tag] = {false, atoms.place(i) != s.place, layout, record_};
     else if (sum_of(record_) != s.sum)
@@ -271,6 +338,13 @@ void ShownBed::give_changes() {
       throw InternalError("granule " + std::to_string(tag) + " was changed and did not wake");
     }
   changes_.clear();
+  for (const auto& [number, c] : changed_clumps_) {
+    const int* i = bed_.index.find(clumps_.at(number).tag);
+    if (!i || bed_.clumps.find(number) < 0) continue;  // deleted
+    bed_.clumps.take(number);
+    bed_.clumps.put(c, *i);
+  }
+  changed_clumps_.clear();
   const Atoms& atoms = bed_.atoms;
   bool far = false;
   for (int i = 0; i < atoms.owned && !far && bed_.ranks.count > 1; ++i) far = !bed_.ranks.owns(atoms.place(i));
@@ -286,6 +360,7 @@ void ShownBed::give(int i, const Change& change) {
   bed_.contacts.clear_histories(i);
   bed_.shell.reset(i);
   const Vec3 place = atoms.place(i);
+  const int clump = bed_.clumps.of(i);
   atoms.take_out(i);
   bed_.index.erase(tag);
   if (i < atoms.owned) bed_.index.set(atoms.tag[i], i);
@@ -293,6 +368,7 @@ void ShownBed::give(int i, const Change& change) {
   const int now = atoms.put_back(change.record, change.layout);
   if (bed_.scales.refills() && !change.moved) atoms.set_place(now, place);  // as it was packed when it woke
   atoms.mark_interface(now, false);
+  if (clump) bed_.clumps.set_clump(now, clump);
   bed_.contacts.clear_histories(now);
   give(now, contacts);
   bed_.index.set(tag, now);

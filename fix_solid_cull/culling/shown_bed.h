@@ -78,6 +78,9 @@ class ShownBed : public FollowsAtoms {
     std::vector<double> record;
   };
 
+  void show_clump(int sphere, std::int64_t tag, Clump clump, int body, bool as_it_was);
+  void join_images();
+  void take_clumps(const std::vector<int>& at);
   void show_interface();
   void show_stored();
   void note(int i, bool stored, std::uint64_t sum);
@@ -87,6 +90,7 @@ class ShownBed : public FollowsAtoms {
   std::uint64_t sum_of(const std::vector<double>& record) const;
   bool is_as_shown(const Shown& s, int i) const;
   void bring_strangers_home(std::vector<int>& at);
+  void add_numbers_of_clump(std::int64_t tag);
   void judge(std::size_t number, int i);
   void give(int i, const Change& change);
 
@@ -100,7 +104,15 @@ class ShownBed : public FollowsAtoms {
   std::vector<int> motion_words_;     // of a record, in their order
   std::vector<double> record_;        // of one granule
   std::vector<KnownContacts> outer_;  // of interface granules, while those within bodies are given
-  std::vector<Vec3> asking_;          // places of those that are to wake
+  struct ShownClump {
+    std::int64_t tag;             // of the sphere that has its mass
+    std::size_t number;           // of that sphere
+    std::vector<double> numbers;  // of the clump, as shown
+  };
+  std::map<int, ShownClump> clumps_;          // by number of the clump
+  std::map<int, Clump> changed_clumps_;       // likewise: as the deck has left them
+  std::vector<std::pair<int, int>> spheres_;  // that are shown, and their clumps
+  std::vector<Vec3> asking_;                  // places of those that are to wake
   std::map<std::int64_t, Change> changes_;
 };
 

@@ -13,7 +13,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261203;  // the format's version
+constexpr double file_mark = 20261210;  // the format's version
 /// The numbers in the file's head. The largest stored radius of each type and a check sum follow them.
 enum Header {
   mark,
@@ -28,6 +28,9 @@ enum Header {
   step,
   no_places,
   has_section,
+  clumps_in_shell,
+  largest_clump,
+  highest_clump,
   identity_high,
   identity_low,
   types,
@@ -60,8 +63,12 @@ std::vector<double> Snapshot::write(bool run_begins) {
   const bool store = bed_.solid.has_store();
   Ledger::Counters sums = bed_.solid.ledger().counters();
   bed_.ranks.sum(sums.data(), Ledger::counters_size);
-  std::int64_t stored = store ? static_cast<std::int64_t>(bed_.solid.store().size()) : 0;
-  bed_.ranks.sum(&stored, 1);
+  std::int64_t held[2] = {store ? static_cast<std::int64_t>(bed_.solid.store().size()) : 0,
+                          static_cast<std::int64_t>(bed_.locked_clumps.all().size())};
+  bed_.ranks.sum(held, 2);
+  const std::int64_t stored = held[0];
+  double clumps[2] = {bed_.clumps.largest(), static_cast<double>(bed_.clumps.highest_number())};
+  bed_.ranks.largest(clumps, 2);
   std::vector<double> radii = bed_.solid.largest_radius_by_type();
   bed_.ranks.largest(radii.data(), static_cast<int>(radii.size()));
   identity_ = store ? ChunkSource::identity(bed_) : 0;
@@ -83,6 +90,9 @@ std::vector<double> Snapshot::write(bool run_begins) {
   h[has_section] = store;
   const auto name = halves(identity_);
   std::copy(name.begin(), name.end(), h + identity_high);
+  h[clumps_in_shell] = static_cast<double>(held[1]);
+  h[largest_clump] = clumps[0];
+  h[highest_clump] = clumps[1];
   h[types] = static_cast<double>(radii.size());
   state.insert(state.end(), radii.begin(), radii.end());
   const auto sum = check_sum(state.data(), state.size());
@@ -122,7 +132,9 @@ std::vector<double> Snapshot::from_bytes(const char* bytes) {
   return state;
 }
 
-std::int64_t Snapshot::interior_of(const std::vector<double>& state) { return static_cast<std::int64_t>(state[1 + interior]); }
+std::int64_t Snapshot::interior_of(const std::vector<double>& state) {
+  return static_cast<std::int64_t>(state[1 + interior] + state[1 + clumps_in_shell]);
+}
 
 void Snapshot::read(const std::vector<double>& state, const std::string& file) {
   state_.assign(state.begin() + 1, state.end() - check_sum_size);
@@ -146,6 +158,7 @@ void Snapshot::read(const std::vector<double>& state, const std::string& file) {
   const int known =
       static_cast<int>(std::min<std::size_t>(bed_.solid.largest_radius_by_type().size(), static_cast<std::size_t>(h[types])));
   for (int type = 1; type < known; ++type) bed_.solid.know_radius(type, h[header_size + type]);
+  bed_.clumps.know_largest(h[largest_clump]);
 }
 
 void Snapshot::take_up() {
@@ -159,6 +172,9 @@ void Snapshot::take_up() {
   if ((h[no_places] != 0) != bed_.scales.refills() && h[interior] > 0)
     throw InputError(std::string("the restart file was written with 'store ") +
                      (bed_.scales.refills() ? "exact' or 'compact" : "none") + "': read it with that store");
+  if (h[largest_clump] > 0 && !bed_.clumps.possible)
+    throw InputError("the restart file holds clumps: put the deck's fix multisphere before the first run");
+  if (bed_.clumps.possible) bed_.clumps.keep_number(static_cast<int>(h[highest_clump]));
   if (h[has_section] == 0) return;
   const std::uint64_t identity = joined(h + identity_high);
   bed_.index.index(bed_.atoms);
@@ -186,7 +202,7 @@ void Snapshot::check_counts(const SectionCounts& due, const SectionCounts& taken
 /// Whether this rank holds what is in the parcel.
 bool Snapshot::holds(const Parcel& p) const {
   return std::all_of(p.granules.begin(), p.granules.end(), [&](const Parcel::Granule& g) {
-    return g.record ? bed_.ranks.owns(p.sender->bodies.at(static_cast<std::size_t>(g.body)).pose.to_world(g.position))
+    return g.record ? bed_.ranks.owns(p.sender->bodies.at(static_cast<std::size_t>(g.body)).pose.to_world(g.home()))
                     : bed_.index.contains(g.tag);
   });
 }

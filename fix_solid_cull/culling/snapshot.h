@@ -29,7 +29,8 @@ class Snapshot {
   /// What write() gave, of its bytes, which need not be aligned. InputError for what another version wrote, or what is not what
   /// was written. Local.
   static std::vector<double> from_bytes(const char* bytes);
-  static std::int64_t interior_of(const std::vector<double>& state);  ///< granules that the file holds besides atoms
+  /// Granules that the file holds besides atoms, and clumps that it holds besides their spheres.
+  static std::int64_t interior_of(const std::vector<double>& state);
   /// Scales, counters and largest radii are known at once, the rest waits in the file for take_up(). InputError for a file whose
   /// section is not there, or is that of another file. Collective.
   void read(const std::vector<double>& state, const std::string& file);

@@ -30,6 +30,14 @@ class StoreExchange {
   std::size_t put_away(const std::vector<int>& atoms);
   /// The granule is an interface granule again, where its body is; returns its index.
   int bring_back(std::int64_t tag);
+  /// Spheres of clumps that have come back together, all of each: they are in one periodic image.
+  void join_images(const std::vector<std::int64_t>& tags) const;
+  /// So many numbers of the record of a granule that has a clump's mass, the last ones, are of the clump.
+  static std::size_t numbers_of_clump(const std::vector<double>& record) {
+    return clump_motion + static_cast<std::size_t>(record.back()) + 1;
+  }
+  /// The clump that a stored granule has in its record, in the frame of its body.
+  static Clump clump_of(const std::vector<double>& record, const StoredGranule& g);
   /// All engine groups, as bits, that a granule that went in is in; of what came out again too, until they are counted anew.
   /// Local.
   int stored_groups() const { return stored_groups_; }
@@ -43,6 +51,9 @@ class StoreExchange {
 
  private:
   static constexpr std::int64_t never = -1;
+  static constexpr std::size_t clump_motion = 6;  // numbers
+
+  static void add_clump(const Clump& c, std::vector<double>& record);
 
   Bed& bed_;
   std::vector<StoreFollower*> followers_;

@@ -60,7 +60,7 @@ class StoredSearch {
   }
 
   /// How far outside its subdomain a rank may hold a stored granule.
-  double slack() const { return bed_.ranks.count > 1 ? bed_.scales.diameter() : 0.0; }
+  double slack() const { return bed_.ranks.count > 1 ? bed_.scales.diameter() + bed_.largest_clump : 0.0; }
 
  private:
   static constexpr int every_frame = -1;

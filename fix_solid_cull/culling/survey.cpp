@@ -1,6 +1,8 @@
 #include "survey.h"
 
+#include <array>
 #include <cmath>
+#include <map>
 
 #include "sphere_cells.h"
 #include "stored_search.h"
@@ -34,7 +36,9 @@ std::int64_t Survey::exterior_here() const {
 double Survey::kinetic_energy_of_exterior() const {
   double energy = 0;
   for (int i = 0; i < bed_.atoms.owned; ++i)
-    if (!bed_.shell[i].locked) energy += 0.5 * bed_.atoms.mass[i] * bed_.atoms.velocity(i).squaredNorm();
+    if (!bed_.shell[i].locked && !bed_.clumps.of(i)) energy += 0.5 * bed_.atoms.mass[i] * bed_.atoms.velocity(i).squaredNorm();
+  if (bed_.clumps.possible)
+    for (int k = 0; k < bed_.clumps.count(); ++k) energy += bed_.clumps.clump(k).kinetic_energy();
   bed_.ranks.sum(&energy, 1);
   return energy;
 }
@@ -83,6 +87,7 @@ std::vector<Vec3> Survey::accelerations() const {
     const int i = motion_.interface_atoms()[k];
     if (!b.stands) a[i] = b.body->motion.acceleration(b.body->pose.to_world(bed_.shell[i].place), b.force, b.torque);
   }
+  if (bed_.clumps.possible) accelerate_clumps(a);
   if (!bed_.ranks.has_neighbours()) return a;
   struct Row {
     Triple at;
@@ -99,6 +104,41 @@ std::vector<Vec3> Survey::accelerations() const {
   return a;
 }
 
+/// Spheres of exterior clumps have the acceleration of their places: forces and torques on all spheres of one turn it, too.
+void Survey::accelerate_clumps(std::vector<Vec3>& a) const {
+  const Atoms& atoms = bed_.atoms;
+  const std::map<int, Clump> clumps = bed_.clump_spheres.near();
+  struct OfSphere {
+    int i;
+    const Clump* clump;
+    Vec3 arm;
+  };
+  std::vector<OfSphere> spheres;
+  using Load = std::array<double, 6>;  // force and torque
+  std::vector<Load> loads(static_cast<std::size_t>(atoms.owned), Load{});
+  for (int i = 0; i < atoms.owned; ++i) {
+    const auto c = bed_.shell.locked(i) ? clumps.end() : clumps.find(bed_.clumps.of(i));
+    if (c == clumps.end()) continue;
+    const Vec3 arm = atoms.place(i) - bed_.solid.nearest_image(c->second.lies.centre, atoms.place(i)), f = atoms.force(i),
+               torque = vec(atoms.torque + 3 * std::size_t(i)) + arm.cross(f);
+    spheres.push_back({i, &c->second, arm});
+    for (int d = 0; d < 3; ++d) {
+      loads[i][d] = f[d];
+      loads[i][3 + d] = torque[d];
+    }
+  }
+  bed_.clump_spheres.unite(loads, [](Load& one, const Load& other) {
+    for (int k = 0; k < 6; ++k) one[k] += other[k];
+  });
+  const Vec3 g = bed_.run.gravity();
+  for (const OfSphere& s : spheres) {
+    const Clump& c = *s.clump;
+    const Vec3 spin = c.spin(), torque = vec(loads[s.i].data() + 3) - spin.cross(c.angular_momentum);
+    const Vec3 turning = c.lies.turn * (c.lies.turn.conjugate() * torque).cwiseQuotient(c.lies.inertia);
+    a[s.i] = vec(loads[s.i].data()) / c.mass + g + turning.cross(s.arm) + spin.cross(spin.cross(s.arm));
+  }
+}
+
 // how it moves against what it touches: by less than twice `speed`, or faster
 constexpr char nearly_quiet = 1, fast = 2;
 
@@ -111,6 +151,7 @@ struct Survey::Seen {
   std::vector<char> drifting;      // it drifts away from one that does not
   std::vector<Vec3> around;        // sum of mass times acceleration of what it touches (N)
   std::vector<double> mass;        // of what it touches (kg)
+  std::vector<char> at_wall;       // it, or its clump, touches one
   std::vector<Pair> between_bodies;
 
   explicit Seen(std::size_t owned)
@@ -119,7 +160,8 @@ struct Survey::Seen {
         loaded(owned, 0),
         drifting(owned, 0),
         around(owned, Vec3::Zero()),
-        mass(owned, 0.0) {}
+        mass(owned, 0.0),
+        at_wall(owned, 0) {}
 };
 
 Survey::Seen Survey::see_contacts(const SolidStateLaw& law) const {
@@ -130,6 +172,7 @@ Survey::Seen Survey::see_contacts(const SolidStateLaw& law) const {
   SolidStateLaw twice = law;
   twice.speed *= 2;
   const double bears = bed_.contacts.reach_factor;
+  for (int i = 0; i < owned; ++i) seen.at_wall[i] = walls_[i].touched > 0;
   const NeighbourRows list = bed_.contacts.neighbours();
   for (int row = 0; row < list.rows; ++row) {
     const int i = list.row[row];
@@ -163,16 +206,49 @@ Survey::Seen Survey::see_contacts(const SolidStateLaw& law) const {
   return seen;
 }
 
+/// What one sphere of a clump touches, all of it touch.
+void Survey::see_clumps(Seen& seen) const {
+  struct Sphere {
+    char touching, moving, loaded, drifting, at_wall;
+    Triple around;
+    double mass;
+  };
+  std::vector<Sphere> spheres;
+  for (std::size_t i = 0; i < seen.touching.size(); ++i)
+    spheres.push_back({seen.touching[i], seen.moving[i], seen.loaded[i], seen.drifting[i], seen.at_wall[i],
+                       triple(seen.around[i]), seen.mass[i]});
+  bed_.clump_spheres.unite(spheres, [](Sphere& one, const Sphere& other) {
+    one.touching |= other.touching;
+    one.moving = std::max(one.moving, other.moving);
+    one.loaded |= other.loaded;
+    one.drifting |= other.drifting;
+    one.at_wall |= other.at_wall;
+    for (int d = 0; d < 3; ++d) one.around[d] += other.around[d];
+    one.mass += other.mass;
+  });
+  for (std::size_t i = 0; i < spheres.size(); ++i) {
+    if (bed_.shell.locked(static_cast<int>(i))) continue;
+    const Sphere& s = spheres[i];
+    seen.touching[i] = s.touching;
+    seen.moving[i] = s.moving;
+    seen.loaded[i] = s.loaded;
+    seen.drifting[i] = s.drifting;
+    seen.at_wall[i] = s.at_wall;
+    seen.around[i] = vec(s.around);
+    seen.mass[i] = s.mass;
+  }
+}
+
 /// Acceleration of what it touches (m/s^2): a wall is a neighbour too; that it is accelerated itself is not known here.
 Vec3 Survey::frame_of(int i, const Seen& seen) const {
-  return seen.around[i] / (seen.mass[i] + (walls_[i].touched > 0 ? bed_.atoms.mass[i] : 0.0));
+  return seen.around[i] / (seen.mass[i] + (seen.at_wall[i] ? bed_.atoms.mass[i] : 0.0));
 }
 
 /// What keeps it awake now; `settling` if nothing does.
 Awake Survey::see(int i, const Seen& seen, const SolidStateLaw& law) {
   const Atoms& atoms = bed_.atoms;
   const AtWall& wall = walls_[i];
-  const bool at_wall = wall.touched > 0, loaded = seen.loaded[i] || at_wall;
+  const bool at_wall = seen.at_wall[i] != 0, loaded = seen.loaded[i] || at_wall;
   const Vec3 v = atoms.velocity(i);
   // a granule that touches nothing but a wall that stands still is one with it where it stays: not where it rolls or slides
   const bool leaves_wall = !seen.touching[i] && wall.stands && std::max(v.norm(), wall.slip) >= law.speed;
@@ -196,7 +272,8 @@ std::int64_t Survey::find_calm(const Patience& patience, Proposal& proposal) {
   SolidStateLaw law = bed_.scales.solid_state();
   law.speed /= patience.speed_divisor;
   law.force /= patience.force_divisor;
-  const Seen seen = see_contacts(law);
+  Seen seen = see_contacts(law);
+  if (bed_.clumps.possible) see_clumps(seen);
   SolidStateLaw twice = law;
   twice.force *= 2;
   std::int64_t candidates = 0;
@@ -209,10 +286,30 @@ std::int64_t Survey::find_calm(const Patience& patience, Proposal& proposal) {
     if (why_[i] == Awake::moving && seen.moving[i] == nearly_quiet)
       awake_.nearly_slow += law.balanced(seen.acceleration[i], frame_of(i, seen));
     if (why_[i] == Awake::unsteady) awake_.nearly_balanced += twice.balanced(seen.acceleration[i], frame_of(i, seen));
-    candidates += rows_[i].calm >= looks_for(i, patience);
   }
+  if (bed_.clumps.possible) unite_calm();
+  for (int i = 0; i < bed_.atoms.owned; ++i) candidates += !bed_.shell[i].locked && rows_[i].calm >= looks_for(i, patience);
   join_bodies(seen, patience.looks, proposal);
   return candidates;
+}
+
+/// A clump is calm if all of its spheres are.
+void Survey::unite_calm() {
+  struct Sphere {
+    Awake why;
+    int calm;
+  };
+  std::vector<Sphere> spheres;
+  for (std::size_t i = 0; i < why_.size(); ++i) spheres.push_back({why_[i], rows_[static_cast<int>(i)].calm});
+  bed_.clump_spheres.unite(spheres, [](Sphere& one, const Sphere& other) {
+    one.why = std::min(one.why, other.why);
+    one.calm = std::min(one.calm, other.calm);
+  });
+  for (std::size_t i = 0; i < spheres.size(); ++i) {
+    if (bed_.shell.locked(static_cast<int>(i))) continue;
+    why_[i] = spheres[i].why;
+    rows_[static_cast<int>(i)].calm = spheres[i].calm;
+  }
 }
 
 /// Bodies that have rested against each other for so many looks are one.
@@ -257,15 +354,20 @@ std::vector<char> Survey::find_steady(const std::vector<char>& asked) {
   std::vector<char> steady(owned, 0);
   const Vec3 g = bed_.run.gravity();
   for (int i = 0; i < atoms.owned; ++i) {
+    if (!asked[i] || walls_[i].touched == 0) continue;
+    // what neither pairs nor weight explain is the walls'
+    const Vec3 wall = atoms.force(i) - pair_sum[i] - weight_in_force(i) * g;
+    normal[i] += wall.norm();
+  }
+  bed_.clump_spheres.unite(normal, [](double& one, double other) { one += other; });
+  for (int i = 0; i < atoms.owned; ++i) {
     if (bed_.shell[i].locked) continue;
     AtRest& r = rows_[i];
     if (!asked[i]) {
       r.normal_load = Locked::not_known;
       continue;
     }
-    // what neither pairs nor weight explain is the walls'
-    const Vec3 wall = atoms.force(i) - pair_sum[i] - atoms.mass[i] * g;
-    const double load = normal[i] + (walls_[i].touched > 0 ? wall.norm() : 0.0), then = r.normal_load;
+    const double load = normal[i], then = r.normal_load;
     const double change = bed_.scales.solid_state().force * atoms.mass[i] * bed_.scales.gravity() +
                           SolidStateLaw::out_of_balance_share * bed_.scales.settings().tolerance_relative * load;
     steady[i] = then != Locked::not_known && std::abs(load - then) <= change;
@@ -273,6 +375,9 @@ std::vector<char> Survey::find_steady(const std::vector<char>& asked) {
   }
   return steady;
 }
+
+/// Mass whose weight is in what the engine says is the force on atom i: what moves clumps adds theirs itself (kg).
+double Survey::weight_in_force(int i) const { return bed_.clumps.of(i) ? 0.0 : bed_.atoms.mass[i]; }
 
 void Survey::leave_out_unsteady(const Patience& patience, Proposal& proposal) {
   const bool live = bed_.scales.needs_surface();
@@ -284,6 +389,7 @@ void Survey::leave_out_unsteady(const Patience& patience, Proposal& proposal) {
     const int from = std::max(1, looks_for(i, patience) - 1);
     asked[i] = live ? calm == from || chosen.contains(atoms.tag[i]) : calm >= from;
   }
+  bed_.clump_spheres.any_of(asked);
   const std::vector<char> steady = find_steady(asked);
   for (int i = 0; i < atoms.owned; ++i) {
     if (!asked[i] || steady[i] || patience.at_once()) continue;  // one look alone knows no change
@@ -303,9 +409,15 @@ void Survey::choose(int i, Proposal& proposal) {
 }
 
 void Survey::choose_deep(const Patience& patience, Cover& cover, Proposal& proposal) {
+  std::vector<char> calm(static_cast<std::size_t>(bed_.atoms.owned)), deep(calm.size());
   for (int i = 0; i < bed_.atoms.owned; ++i) {
-    if (bed_.shell[i].locked || rows_[i].calm < looks_for(i, patience)) continue;
-    if (cover.is_deep(i))
+    calm[i] = !bed_.shell[i].locked && rows_[i].calm >= looks_for(i, patience);
+    deep[i] = calm[i] && cover.is_deep(i);
+  }
+  bed_.clump_spheres.all_of(deep);
+  for (int i = 0; i < bed_.atoms.owned; ++i) {
+    if (!calm[i]) continue;
+    if (deep[i])
       choose(i, proposal);
     else
       rows_[i].waited = 0;
@@ -345,9 +457,13 @@ void Survey::choose_asleep(const Patience& patience, Proposal& proposal) {
       for (const Row& r : bed_.ranks.exchange(rows, cover + contact_reach(bed_))) spheres.push_back({vec(r.at), r.radius});
     awake.build(std::move(spheres), std::max(cover, 2 * bed_.scales.diameter()));
   }
+  std::vector<char> asleep(static_cast<std::size_t>(atoms.owned), 0);
+  for (int i = 0; i < atoms.owned; ++i)
+    asleep[i] = !bed_.shell[i].locked && calm_enough(i, patience) && !(cover > 0 && awake.any_near(atoms.sphere(i), cover));
+  bed_.clump_spheres.all_of(asleep);
   for (int i = 0; i < atoms.owned; ++i) {
     if (bed_.shell[i].locked) continue;
-    if (calm_enough(i, patience) && !(cover > 0 && awake.any_near(atoms.sphere(i), cover)))
+    if (asleep[i])
       choose(i, proposal);
     else
       rows_[i].waited = 0;
@@ -391,6 +507,8 @@ void Survey::tie(Proposal& proposal) {
     const bool side_change = first && second && j >= owned && bed_.shell[i].locked && !atoms.is_interface(j);
     if (side_change && bears) proposal.side_changes.push_back({atoms.tag[i], atoms.tag[j], bed_.contacts.force_on_first(i, k)});
   });
+  bed_.clump_spheres.any_of(touching);
+  bed_.clump_spheres.any_of(goes_along);
   // alone among neighbours that all stay exterior it would make no solid: nothing is saved until one of them comes along
   for (int i = 0; i < owned; ++i) {
     if (!touching[i] || goes_along[i] || !chosen.contains(atoms.tag[i])) continue;

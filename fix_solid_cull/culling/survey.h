@@ -91,15 +91,15 @@ class Survey {
   /// Instead of it, where culling waits: nobody is calm. Local.
   void forget_calm();
   /// Granules whose load still changes from look to look are no solid state, however slowly they move; nor are they chosen. One
-  /// look before they could go, so that none is lost. Local.
+  /// look before they could go, so that none is lost. Local, but for clumps: then collective.
   void leave_out_unsteady(const Patience& patience, Proposal& proposal);
   /// `exterior sleep`: whoever is in solid state is chosen, but for a cover around what is not. Collective.
   void choose_asleep(const Patience& patience, Proposal& proposal);
-  /// `exterior live`: whoever is in solid state and deep below the surface. Local.
+  /// `exterior live`: whoever is in solid state and deep below the surface. Likewise.
   void choose_deep(const Patience& patience, Cover& cover, Proposal& proposal);
   /// Whether granules were chosen here, or within reach of this rank's. Collective.
   bool some_chosen_near(const Proposal& proposal) const;
-  /// What ties the chosen to their neighbours; who would make no solid is left out. Local.
+  /// What ties the chosen to their neighbours; who would make no solid is left out. Local, but for clumps: then collective.
   void tie(Proposal& proposal);
 
   /// What keeps this rank's exterior granules awake, at the end of a look. Local.
@@ -122,6 +122,9 @@ class Survey {
     rows_[i].normal_load = Locked::not_known;
   }
   std::vector<Vec3> accelerations() const;
+  void accelerate_clumps(std::vector<Vec3>& of_atoms) const;
+  void see_clumps(Seen& seen) const;
+  void unite_calm();
   Seen see_contacts(const SolidStateLaw& law) const;
   Vec3 frame_of(int i, const Seen& seen) const;
   Awake see(int i, const Seen& seen, const SolidStateLaw& law);
@@ -129,6 +132,7 @@ class Survey {
   void begin_count();
   void join_bodies(const Seen& seen, int looks, Proposal& proposal);
   std::vector<char> find_steady(const std::vector<char>& asked);
+  double weight_in_force(int i) const;
   int looks_for(int i, const Patience& patience) const;
   bool calm_enough(int i, const Patience& patience) const;
   void choose(int i, Proposal& proposal);

@@ -6,6 +6,7 @@
 #include "atom.h"
 #include "deck_commands.h"
 #include "force.h"
+#include "modify.h"
 #include "neigh_list.h"
 #include "neighbor.h"
 #include "pair_gran.h"
@@ -23,7 +24,8 @@ void EngineContacts::connect() {
   const auto model = static_cast<std::uint64_t>(static_cast<LAMMPS_NS::PairGran*>(force->pair)->hashcode());
   const auto part = [model](int n) { return static_cast<int>(model >> 6 * n & 63); };
   const int tangential = part(1), cohesion = part(2), rolling = part(3);
-  turn_granules = tangential != 0 || rolling != 0 || cohesion > last_cohesion_without_torque;
+  const bool clumps = modify->n_fixes_style("multisphere") > 0;  // these are turned by what presses on their spheres
+  turn_granules = tangential != 0 || rolling != 0 || cohesion > last_cohesion_without_torque || clumps;
 }
 
 void EngineContacts::renew() { reach_factor = neighbor->contactDistanceFactor; }

@@ -16,6 +16,7 @@
 #include "fix_insert_pack.h"
 #include "fix_insert_stream.h"
 #include "fix_massflow_mesh.h"
+#include "fix_multisphere.h"
 #include "memory.h"
 #include "modify.h"
 #include "neigh_list.h"
@@ -86,6 +87,11 @@ SOLIDCULL_EXPOSE(SortNext, Atom, int*, next)
 SOLIDCULL_EXPOSE(SortPermutation, Atom, int*, permute)
 SOLIDCULL_EXPOSE(SortMostAtoms, Atom, int, maxnext)
 SOLIDCULL_EXPOSE(SameTagAtoms, Atom, int, smax)
+SOLIDCULL_EXPOSE(ClumpsHere, Multisphere, int, nbody_)
+SOLIDCULL_EXPOSE(RowsOfClumps, Multisphere, int*, mapArray_)
+SOLIDCULL_EXPOSE(HighestClump, Multisphere, int, mapTagMax_)
+SOLIDCULL_EXPOSE(ClumpsOfAtoms, FixMultisphere, int*, body_)
+SOLIDCULL_EXPOSE(Displacements, FixMultisphere, double**, displace_)
 #undef SOLIDCULL_EXPOSE
 
 std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify) { return *(modify.*member(ModifyFixMap())); }
@@ -222,6 +228,12 @@ void set_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_
   drop(atom.*member(SortBinHeads()), atom.*member(SortMostBins()));
   (atom.*member(SortSetup()))();
 }
+
+int& clumps_here(LAMMPS_NS::Multisphere& clumps) { return clumps.*member(ClumpsHere()); }
+int*& rows_of_clumps(LAMMPS_NS::Multisphere& clumps) { return clumps.*member(RowsOfClumps()); }
+int& highest_clump(LAMMPS_NS::Multisphere& clumps) { return clumps.*member(HighestClump()); }
+int* clumps_of_atoms(LAMMPS_NS::FixMultisphere& fix) { return fix.*member(ClumpsOfAtoms()); }
+double* const* displacements(const LAMMPS_NS::FixMultisphere& fix) { return fix.*member(Displacements()); }
 
 void* found_symbol(const char* name) { return dlsym(RTLD_NEXT, name); }
 

@@ -17,9 +17,11 @@ class FixInsert;
 class FixInsertPack;
 class FixInsertStream;
 class FixMeshSurface;
+class FixMultisphere;
 class LAMMPS;
 class Memory;
 class Modify;
+class Multisphere;
 class Neighbor;
 class Region;
 class Thermo;
@@ -96,6 +98,12 @@ struct Stream {
 Stream stream_of(const LAMMPS_NS::FixInsertStream& fix);
 /// Regions that a union or an intersection is made of, all the way down; the region itself, if it is neither.
 std::vector<const LAMMPS_NS::Region*> parts_of(const LAMMPS_NS::Region* region, const LAMMPS_NS::Domain& domain);
+// --- clumps: the table of rows that this rank moves
+int& clumps_here(LAMMPS_NS::Multisphere& clumps);
+int*& rows_of_clumps(LAMMPS_NS::Multisphere& clumps);  ///< by number
+int& highest_clump(LAMMPS_NS::Multisphere& clumps);
+int* clumps_of_atoms(LAMMPS_NS::FixMultisphere& fix);
+double* const* displacements(const LAMMPS_NS::FixMultisphere& fix);  ///< of atoms from the centres of their clumps, along axes
 /// The fix does its work before the exchange of atoms when all others have done theirs. Until lists of fixes are made anew.
 void act_last_before_exchange(LAMMPS_NS::Modify& modify, const LAMMPS_NS::Fix* fix);
 

@@ -28,6 +28,7 @@ namespace solidcull {
 FixSolidCull::FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
     : Fix(lmp, narg, arg),
       atoms_(lmp, this),
+      clumps_(lmp),
       contacts_(lmp),
       walls_(lmp),
       insertions_(lmp),
@@ -41,9 +42,10 @@ FixSolidCull::FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
     rules_.refuse_what_was_set_up_wrongly();
     if (!atoms_.make_interface_group())
       throw InputError("all 32 groups are taken and interface granules need one: delete a group");
+    clumps_.connect();
     box_change_domain = settings.balance_every > 0;  // the engine sets up its messages and meshes anew with each neighbour build
-    culling_ =
-        std::make_unique<Culling>(Ports{atoms_, contacts_, walls_, insertions_, ranks_, run_, memory_}, settings, atom->ntypes);
+    culling_ = std::make_unique<Culling>(Ports{atoms_, clumps_, contacts_, walls_, insertions_, ranks_, run_, memory_}, settings,
+                                         atom->ntypes);
   } catch (const InputError& e) {
     refuse(e.what());
   }
@@ -107,6 +109,7 @@ void FixSolidCull::fail(const std::string& why) {
 
 void FixSolidCull::renew() {
   atoms_.renew();
+  clumps_.renew();
   contacts_.renew();
   run_.renew();
 }
@@ -145,6 +148,7 @@ void FixSolidCull::init() {
   hand_on([&] {
     rules_.refuse_what_cannot_be_culled();
     engine::act_last_before_exchange(*modify, this);  // what others insert or delete there is seen at once
+    clumps_.connect();
     contacts_.connect();
     walls_.connect();
     if (waits_for_run()) rules_.find_movable(atoms_, run_);  // write_restart takes up what a file holds, without a run

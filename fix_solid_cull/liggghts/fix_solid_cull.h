@@ -7,6 +7,7 @@
 #include <string>
 
 #include "atoms.h"
+#include "clumps.h"
 #include "contacts.h"
 #include "culling.h"
 #include "deck_rules.h"
@@ -47,6 +48,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   double memory_usage() override;
   void box_extent(double& xlo, double& xhi, double& ylo, double& yhi, double& zlo, double& zhi) override;
   double max_rad(int type) override;
+  double extend_cut_ghost() override { return clumps_.largest(); }
   int min_type() override;
   int max_type() override;
 
@@ -111,6 +113,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void publish_flags();
 
   EngineAtoms atoms_;
+  EngineClumps clumps_;
   EngineContacts contacts_;
   EngineWalls walls_;
   EngineInsertions insertions_;

@@ -11,7 +11,7 @@ constexpr Treatment exact = Treatment::exact, integrates = Treatment::integrates
 constexpr const char* adds_forces = "adds forces that culled granules would miss";
 constexpr const char* no_spins = "does not turn granules, and solid bodies turn";
 constexpr const char* marks_granules = "marks or times granules one by one, and culled ones would be left out";
-constexpr const char* no_clumps = "multisphere clumps are not supported yet";
+constexpr const char* no_such_clumps = "clumps that break, or that another program moves, would miss those that are culled";
 constexpr const char* spheres_only = "only spheres are supported";
 constexpr const char* no_fluid = "a coupled solver would miss the culled granules";
 constexpr const char* no_sph = "SPH would miss the culled granules";
@@ -34,6 +34,8 @@ constexpr FixStyle fix_styles[] = {
     {"move/mesh*", exact, ""},
     {"particledistribution/*", exact, ""},
     {"diam/max", exact, ""},
+    {"particletemplate/multiplespheres", exact, ""},
+    {"particletemplate/multisphere", exact, ""},
     {"particletemplate/sphere", exact, ""},
     {"print", exact, ""},
     {"property/atom", exact, ""},
@@ -49,6 +51,7 @@ constexpr FixStyle fix_styles[] = {
     {"massflow/mesh", exact, ""},
 
     {"nve/sphere", integrates, ""},
+    {"multisphere", integrates, ""},
 
     {"ave/euler*", atoms_only, ""},
     {"ave/histo", atoms_only, ""},
@@ -89,19 +92,18 @@ constexpr FixStyle fix_styles[] = {
     {"bond*", refused, "bonds would miss the culled granules"},
     {"box/relax", refused, box_changes},
     {"check/timestep/sph", refused, no_sph},
-    {"concave", refused, no_clumps},
+    {"concave", refused, spheres_only},
     {"couple/*", refused, no_fluid},
     {"deform*", refused, box_changes},
     {"dt/reset", refused, "the time step would change within a run, and the scales of culling follow from it"},
     {"heat/*", refused, no_heat},
     {"multicontact/*", refused, "contacts that act on each other would miss those of culled granules"},
-    {"multisphere*", refused, no_clumps},
+    {"multisphere/*", refused, no_such_clumps},
     {"nve/asphere*", refused, spheres_only},
     {"nve/line", refused, spheres_only},
     {"nve/sph", refused, no_sph},
     {"nve/sph/*", refused, no_sph},
     {"nve/superquadric", refused, spheres_only},
-    {"particletemplate/multi*", refused, no_clumps},
     {"particletemplate/superquadric", refused, spheres_only},
     {"property/atom/timetracer", refused, "LIGGGHTS has no such style any more: it is property/atom/regiontracer/time now"},
     {"rigid*", refused, "rigid clumps of granules are not supported yet"},

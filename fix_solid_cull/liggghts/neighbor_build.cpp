@@ -2,7 +2,7 @@
 // bins are as wide as half the reach of the largest granule, and each granule looks at all within them, wherever in memory they
 // are. Here granules of one bin lie side by side (SphereBins). With a ball of eight diameters in the bed such a build costs ten
 // steps: granules of unequal sizes are found through SphereLevels. Decks that have a fix solid/cull get this one, others and
-// those with exclusions, included groups or triclinic boxes the engine's own. Local.
+// those with exclusions but for pairs within clumps, included groups or triclinic boxes the engine's own. Local.
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
@@ -72,7 +72,8 @@ using solidcull::engine::own;
 
 // interposed as those in register_styles.cpp; a member, for the engine's bins and histories are its own
 void Neighbor::granular_bin_no_newton(NeighList* list) {
-  if (exclude || includegroup || triclinic || !culls(*modify)) {
+  const bool excludes_more = exclude && (nex_type || nex_group);
+  if (excludes_more || includegroup || triclinic || !culls(*modify)) {
     using Original = void (*)(Neighbor*, NeighList*);
     static const auto original = own<Call::neighbor_build, Original>();
     original(this, list);
@@ -106,19 +107,24 @@ void Neighbor::granular_bin_no_newton(NeighList* list) {
   bool some_touch_nothing = false;
   for (int i = 0; solidcull::WholeBedForces::at_work() && i < all; ++i)
     some_touch_nothing = some_touch_nothing || touches_nothing(i);
+  const bool leaves_some_out = some_touch_nothing || exclude;
+  const auto within_a_clump = [&](int i, int j) {
+    return exclusion(i, j, atom->type[i], atom->type[j], atom->mask, atom->molecule) != 0;
+  };
   std::vector<Near> those_that_touch;
   for (int i = 0; i < owned; ++i) {
     const std::vector<Near>& found =
         by_bins ? near_bins.above(i, atom->x[i], atom->radius[i], bin[i]) : by_levels.above(i, atom->x[i], atom->radius[i], bin);
     int n = static_cast<int>(by_bins ? near_bins.found() : by_levels.found());
-    if (some_touch_nothing) {
+    if (leaves_some_out) {
       those_that_touch.clear();
-      if (!touches_nothing(i))
-        std::copy_if(found.begin(), found.begin() + n, std::back_inserter(those_that_touch),
-                     [&](const Near& one) { return !touches_nothing(one.index); });
+      if (!some_touch_nothing || !touches_nothing(i))
+        std::copy_if(found.begin(), found.begin() + n, std::back_inserter(those_that_touch), [&](const Near& one) {
+          return !(some_touch_nothing && touches_nothing(one.index)) && !(exclude && within_a_clump(i, one.index));
+        });
       n = static_cast<int>(those_that_touch.size());
     }
-    const std::vector<Near>& near = some_touch_nothing ? those_that_touch : found;
+    const std::vector<Near>& near = leaves_some_out ? those_that_touch : found;
     int* const partners = list->ipage->get(n);
     int* const touched = kept ? kept->ipage->get(n) : nullptr;
     double* const history = kept ? kept->dpage->get(n * width) : nullptr;

@@ -87,6 +87,8 @@ auto GranuleStore::head_of_row(StoredGranule g) const -> Head {
     head[normal_load_word] = word_of({g.normal_load, g.load_change[0], g.load_change[1], g.load_change[2]});
   }
   int k = 0;
+  if (g.has_clump) g.each_of_clump([&](double& x) { head[clump_words + k++] = bits_of(x); });
+  k = 0;
   g.each_small([&](auto& x) {
     head[small_words + k / 2] |= static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32 * (k % 2);
     ++k;
@@ -193,6 +195,8 @@ StoredGranule GranuleStore::granule(int s) const {
     x = static_cast<std::decay_t<decltype(x)>>(static_cast<std::uint32_t>(row[small_words + k / 2] >> 32 * (k % 2)));
     ++k;
   });
+  k = clump_words;
+  if (g.has_clump) g.each_of_clump([&](double& x) { x = number_of(row[k++]); });
   return g;
 }
 
@@ -351,6 +355,15 @@ void GranuleStore::relocate(int s, int body, const Vec3& place) {
 }
 
 void GranuleStore::move(std::int64_t tag, int body, const Vec3& position) { relocate(slot_or_throw(tag), body, position); }
+
+void GranuleStore::shift_clump(std::int64_t tag, const Vec3& by) {
+  const int s = slot_or_throw(tag);
+  const StoredGranule before = granule(s);
+  if (!before.has_clump) return;
+  StoredGranule after = before;
+  after.of_clump.centre += by;
+  change(s, before, after);
+}
 
 void GranuleStore::share(int body, bool on) {
   const int from = frame_of(body);

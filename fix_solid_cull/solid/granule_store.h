@@ -89,6 +89,8 @@ class GranuleStore {
 
   /// The granule belongs to another body now, at this place in that body's frame.
   void move(std::int64_t tag, int body, const Vec3& position);
+  /// The clump whose mass this granule has, if it has one, is by so much elsewhere in the frame of its body.
+  void shift_clump(std::int64_t tag, const Vec3& by);
   /// All granules of a body that was swallowed go to `kept`, into its frame; place(StoredGranule&) puts each where it is there,
   /// and may change what else is a matter of the frame. What share() said of the swallowed body is forgotten.
   template <class Place>
@@ -214,7 +216,8 @@ class GranuleStore {
     step_word,
     normal_load_word,
     load_change_word,
-    small_words = load_change_word + 3
+    clump_words = load_change_word + 3,
+    small_words = clump_words + StoredGranule::clump_numbers
   };
   static constexpr int record_begin = small_words + (SmallNumbers::count() + 1) / 2;
   using Head = std::array<std::uint64_t, record_begin>;

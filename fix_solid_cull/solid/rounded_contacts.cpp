@@ -27,7 +27,8 @@ std::vector<char> RoundedContacts::pack(const Resident& g, const ContactList& co
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const std::int64_t partner = contacts.partner(k);
     const auto other = contacts.stored(k, store_);
-    if (!other) continue;
+    const double touch = other ? (1 + SolidStateLaw::gap) * (g.radius + other->radius) : 0;
+    if (!other || (!contacts.history(k) && apart(g, *other).norm() > touch)) continue;  // spheres of one clump are tied
     kept[k] = true;
     forget_alike(*other, g.tag);
     const bool confused = std::any_of(partners.begin(), partners.end(),

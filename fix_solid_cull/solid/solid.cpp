@@ -66,6 +66,33 @@ void Solid::know_radius(int type, double radius) {
 
 double Solid::kinetic_energy(int body) const { return exists(body) ? bodies_.body(body).part().kinetic_energy() : 0.0; }
 
+/// Spheres of a clump are tied to each other.
+void Solid::add_rest_of_clumps(std::vector<std::int64_t>& tags) const {
+  FlatMap<char> seen;
+  for (const std::int64_t tag : tags) seen[tag] = 1;
+  for (std::size_t at = 0; at < tags.size(); ++at) {
+    const int clump = store_->get(tags[at]).clump;
+    if (clump == 0) continue;
+    contacts_.for_each_partner(tags[at], [&](std::int64_t partner) {
+      if (seen.contains(partner) || !store_->contains(partner) || store_->get(partner).clump != clump) return;
+      seen[partner] = 1;
+      tags.push_back(partner);
+    });
+  }
+}
+
+Vec3 Solid::home_of(std::int64_t tag) const {
+  const StoredGranule g = store_->get(tag);
+  Vec3 home = g.position;
+  if (g.clump == 0 || g.has_clump) return home;
+  contacts_.for_each_partner(tag, [&](std::int64_t partner) {
+    if (!store_->contains(partner)) return;
+    const StoredGranule other = store_->get(partner);
+    if (other.clump == g.clump && other.has_clump) home = other.position;
+  });
+  return home;
+}
+
 // ------------------------------------------------------------------------------------------------------------ bodies
 
 void Solid::split(const MassOf& mass_of) {
@@ -82,6 +109,7 @@ void Solid::split(const MassOf& mass_of) {
     const Resident g = *store_->find(tag);
     changed(from, {g.position, g.radius});
     store_->move(tag, body, place);
+    if (place != g.position) store_->shift_clump(tag, place - g.position);
   });
   if (!scales_.sleeping()) return;
   came_off.insert(bodies_.split_parents().begin(), bodies_.split_parents().end());
@@ -114,6 +142,7 @@ void Solid::adopt_swallowed() {
         return;
       }
       g.position = to.to_frame(from.to_world(g.position));
+      if (g.has_clump) g.of_clump = g.of_clump.seen_from(from, to);
       g.load_change = turn * g.load_change;
       turn_contacts(g.tag, turn);
       if (sites_) {
@@ -147,7 +176,7 @@ int Solid::found(const SolidBody& body) {
 }
 
 void Solid::reframe_one(int body, const GranuleMass& in_world) {
-  bodies_.body(body).reframe_one({in_world.mass, in_world.position, bodies_.turning_radius(in_world.radius), in_world.held});
+  bodies_.body(body).reframe_one(in_world, bodies_.turning_radius(in_world.radius));
   tell([&](BodyFollower& f) { f.frame_changed(body); });
 }
 
@@ -250,7 +279,7 @@ StoredGranule Solid::as_stored(const StoredGranule& g) {
   }
   const StoredGranule kept = store_->rounded(g);
   // else many small ways add up when they leave
-  if (scales_.compact()) bodies_.shift(g.body, {g.mass, g.position, g.radius, g.held}, kept.position);
+  if (scales_.compact() && g.clump == 0) bodies_.shift(g.body, {g.mass, g.position, g.radius, g.held}, kept.position);
   return kept;
 }
 

@@ -105,6 +105,10 @@ class Solid {
   double kinetic_energy(int body) const;
   /// Counts how often stored granules came to stand still in other ways than by being put away.
   int standing_version() const { return standing_version_; }
+  /// All stored spheres of clumps of which some are named are named then, once or more.
+  void add_rest_of_clumps(std::vector<std::int64_t>& tags) const;
+  /// See StoredGranule::home().
+  Vec3 home_of(std::int64_t tag) const;
   /// History of a contact between two stored granules that is not in the graph, as g sees it; false if it has none.
   bool inner_history(const Resident& g, std::int64_t partner, double* history) const {
     return inner_->history(g, partner, history);

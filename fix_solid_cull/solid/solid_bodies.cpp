@@ -11,30 +11,53 @@
 
 namespace solidcull {
 
-void MassProperties::add(double m, const Vec3& x, double r, int sign, bool is_held) {
-  if (count == 0) *this = MassProperties{0, x};
-  const Vec3 arm = x - about;
+void MassProperties::add(const GranuleMass& g, double turning_radius, int sign) {
+  if (count == 0) {
+    *this = MassProperties();
+    about = g.position;
+  }
   count += sign;
-  mass += sign * m;
-  first += sign * m * arm;
-  second += sign * m * arm * arm.transpose();
-  spin += sign * 0.4 * m * r * r;
-  if (is_held) held += sign;
+  if (g.held) held += sign;
+  if (g.mass == 0) return;
+  weighing += sign;
+  const Vec3 arm = (g.clump ? g.clump->centre : g.position) - about;
+  mass += sign * g.mass;
+  first += sign * g.mass * arm;
+  second += sign * g.mass * arm * arm.transpose();
+  if (g.clump)
+    second += sign * g.clump->second();
+  else
+    spin += sign * 0.4 * g.mass * turning_radius * turning_radius;
+  drop_rounding();
+}
+
+/// What is left of the sums where nothing has mass.
+void MassProperties::drop_rounding() {
+  if (weighing > 0) return;
+  mass = spin = 0;
+  first = Vec3::Zero();
+  second = Eigen::Matrix3d::Zero();
 }
 
 void MassProperties::add(const MassProperties& other, int sign) {
-  if (count == 0) *this = MassProperties{0, other.about};
+  if (count == 0) {
+    *this = MassProperties();
+    about = other.about;
+  }
   const Vec3 arm = other.about - about;
   count += sign * other.count;
+  weighing += sign * other.weighing;
   mass += sign * other.mass;
   first += sign * (other.first + other.mass * arm);
   second +=
       sign * (other.second + other.first * arm.transpose() + arm * other.first.transpose() + other.mass * arm * arm.transpose());
   spin += sign * other.spin;
   held += sign * other.held;
+  drop_rounding();
 }
 
 Eigen::Matrix3d MassProperties::inertia() const {
+  if (weighing == 0) return Eigen::Matrix3d::Zero();
   const Eigen::Matrix3d about_centre = second - first * first.transpose() / mass;
   return (about_centre.trace() + spin) * Eigen::Matrix3d::Identity() - about_centre;
 }
@@ -75,7 +98,7 @@ void SolidBody::ground(bool on) {
   changed = true;
   step_then = -1;
   acceleration = Vec3::Zero();
-  twist = {pose.to_world(mass.centre()), Vec3::Zero(), is_one_granule() ? twist.spin : Vec3(Vec3::Zero())};
+  twist = {pose.to_world(mass.centre()), Vec3::Zero(), is_one_sphere() ? twist.spin : Vec3(Vec3::Zero())};
 }
 
 void SolidBody::begin_to_rest() {
@@ -84,18 +107,19 @@ void SolidBody::begin_to_rest() {
   extra_load = Vec3::Zero();
 }
 
-void SolidBody::reframe_one(const GranuleMass& in_world) {
+void SolidBody::reframe_one(const GranuleMass& in_world, double turning_radius) {
   felt = pose.turned_to_world(felt);
   mass = MassProperties();
-  mass.add(in_world.mass, in_world.position, in_world.radius, 1, in_world.held);
+  mass.add(in_world, turning_radius);
   pose = Pose();
 }
 
 void SolidBody::settle() {
+  changed = false;
+  if (mass.weighing == 0) return;  // spheres of clumps whose mass has been lost: they will be, too
   const RigidPart all = part();
   motion = RigidMotion(&all, 1, free_axes());
   take_twist();
-  changed = false;
 }
 
 void SolidBody::settle_as_part(const RigidSum& whole, const FreeAxes& free, const Vec3& shift, double grounded_share) {
@@ -162,12 +186,19 @@ void SolidBodies::centre_moved(SolidBody& body, const Vec3& from) {
   body.velocity_then += body.twist.spin.cross(to - from);
 }
 
+RigidPart SolidBodies::part_of(const MovingGranule& g) const {
+  if (g.clump) return {g.mass, g.clump->centre, g.clump->tensor(), g.velocity, g.spin};
+  return RigidPart::granule(g.mass, turning_radius(g.radius), g.position, g.velocity,
+                            granules_turn_ ? g.spin : Vec3(Vec3::Zero()));  // else it keeps its own
+}
+
 void SolidBodies::stand_still(SolidBody& body) { body.twist.velocity = body.twist.spin = Vec3::Zero(); }
 
 /// The body's velocity field becomes that of body and part tied together. The mass properties are the caller's.
 void SolidBodies::add(SolidBody& body, const RigidPart& part) {
   body.changed = true;
-  if (body.mass.count == 0) {
+  if (part.mass == 0 && body.mass.count > 0) return;
+  if (body.mass.weighing == 0) {
     body.twist = {part.centre, part.velocity, part.spin};
     if (body.grounded) stand_still(body);
     return;
@@ -201,7 +232,7 @@ int SolidBodies::merge(int a, int b, Vec3 shift) {
   kept.extra_load += gone.extra_load;
   add(kept, gone.part());
   if (kept.felt_known && gone.felt_known) {
-    const double share = gone.mass.mass / (kept.mass.mass + gone.mass.mass);
+    const double both = kept.mass.mass + gone.mass.mass, share = both > 0 ? gone.mass.mass / both : 0.0;
     kept.felt += share * (kept.pose.turned_to_frame(gone.pose.turned_to_world(gone.felt)) - kept.felt);
   }
   kept.step_then = -1;
@@ -233,10 +264,13 @@ SolidBodies::Place SolidBodies::lock(std::int64_t tag, const MovingGranule& gran
     SolidBody& b = this->body(body);
     const bool first = b.mass.count == 0;
     const Vec3 before = first ? Vec3(Vec3::Zero()) : b.pose.to_world(b.mass.centre());
-    const double radius = turning_radius(granule.radius);
-    const Vec3 spin = granules_turn_ ? granule.spin : Vec3(Vec3::Zero());  // else it keeps its own
-    add(b, RigidPart::granule(granule.mass, radius, position, granule.velocity, spin));
-    b.mass.add(granule.mass, b.pose.to_frame(position), radius, 1, granule.held);
+    MovingGranule here = granule;
+    here.position = position;
+    if (here.clump) here.clump->centre += position - granule.position;
+    add(b, part_of(here));
+    GranuleMass mass{granule.mass, b.pose.to_frame(position), granule.radius, granule.held, std::nullopt};
+    if (here.clump) mass.clump = here.clump->in_frame(b.pose);
+    b.mass.add(mass, turning_radius(granule.radius));
     b.summed = std::max(b.summed, b.mass.count);
     if (!first) centre_moved(b, before);
     member_[narrow_tag(tag)] = number = body;
@@ -273,20 +307,19 @@ void SolidBodies::unlock(std::int64_t tag, const GranuleMass& granule, const Fro
   SolidBody& body = this->body(number);
   body.changed = true;
   const Vec3 before = body.pose.to_world(body.mass.centre());
-  body.mass.add(granule.mass, granule.position, turning_radius(granule.radius), -1, granule.held);
+  body.mass.add(granule, turning_radius(granule.radius), -1);
   if (body.mass.count == 0) {
     bodies_.erase(number);
     return;
   }
   centre_moved(body, before);
   if (body.grounded) stand_still(body);
-  if (!given || body.grounded) return;
+  if (!given || given->mass == 0 || body.mass.weighing == 0 || body.grounded) return;
   // the difference to the body's own field stays with the body
   RigidPart rest = body.part();
-  const Vec3 own_velocity = body.twist.at(given->position), own_spin = body.twist.spin;
-  const RigidPart difference =
-      RigidPart::granule(given->mass, turning_radius(given->radius), given->position, own_velocity - given->velocity,
-                         granules_turn_ ? Vec3(own_spin - given->spin) : own_spin);
+  RigidPart difference = part_of(*given);
+  difference.velocity = body.twist.at(difference.centre) - difference.velocity;
+  difference.spin = body.twist.spin - difference.spin;
   const Vec3 momentum = difference.mass * difference.velocity;
   const Vec3 turning = difference.angular_momentum(rest.centre);
   RigidMotion motion(&rest, 1, body.free_axes());
@@ -308,7 +341,7 @@ void SolidBodies::sum_anew(int number, std::int64_t member, const FrozenContacts
   MassProperties sum;
   for (const std::int64_t tag : reached) {
     const GranuleMass g = mass_of(tag);
-    sum.add(g.mass, g.position, turning_radius(g.radius), 1, g.held);
+    sum.add(g, turning_radius(g.radius));
   }
   body(number).mass = sum;
   body(number).summed = sum.count;
@@ -343,7 +376,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       MassProperties gone;
       for (const std::int64_t tag : part) {
         const GranuleMass g = mass_of(tag);
-        gone.add(g.mass, g.position, turning_radius(g.radius), 1, g.held);
+        gone.add(g, turning_radius(g.radius));
       }
       rest.mass.add(gone, -1);
       // what was tied to its own image may hang free of it now: its places are brought together again
@@ -370,8 +403,10 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
         });
       }
       for (std::size_t at = 0; at < order.size(); ++at) {
-        const GranuleMass g = mass_of(order[at]);
-        off.mass.add(g.mass, place[at], turning_radius(g.radius), 1, g.held);
+        GranuleMass g = mass_of(order[at]);
+        if (g.clump) g.clump->centre += place[at] - g.position;
+        g.position = place[at];
+        off.mass.add(g, turning_radius(g.radius));
         if (int* member = member_.find(narrow_tag(order[at]))) *member = fresh;
         moved(order[at], fresh, place[at]);
       }
@@ -379,7 +414,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       if (was_grounded) stand_still(off);
       off.grounded = was_grounded && off.mass.held > 0;
       rest.grounded = was_grounded && rest.mass.held > 0;
-      const double share = std::min(1.0, grounded_mass / whole);
+      const double share = whole > 0 ? std::min(1.0, grounded_mass / whole) : 0.0;
       off.grounded_mass = off.grounded ? share * off.mass.mass : 0.0;
       rest.grounded_mass = rest.grounded ? share * rest.mass.mass : 0.0;
       split_parents_.push_back(body);

@@ -7,9 +7,11 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "clump_mass.h"
 #include "flat_map.h"
 #include "frozen_contacts.h"
 #include "pose.h"
@@ -18,10 +20,29 @@
 
 namespace solidcull {
 
+/// A locked granule, in the frame of its body. Of a clump, one sphere has all that the clump weighs, and the others nothing.
+struct GranuleMass {
+  double mass;
+  Vec3 position;
+  double radius;
+  bool held = false;                              ///< it touches a wall that stands still
+  std::optional<ClumpMass> clump = std::nullopt;  ///< it has the mass of a clump
+};
+
+/// A sphere that is to be locked, or is given back with this motion: of its centre, or of the centre of mass of the clump whose
+/// mass it has. World frame.
+struct MovingGranule {
+  double mass, radius;
+  Vec3 position, velocity, spin;
+  bool held = false;                              ///< it touches a wall that stands still
+  std::optional<ClumpMass> clump = std::nullopt;  ///< it has the mass of a clump
+};
+
 /// Sums over granules that are added and taken away as granules come and go. SI units, body frame, about a point in the body, so
 /// that nothing is lost to a far origin.
 struct MassProperties {
-  std::int64_t count = 0;
+  std::int64_t count = 0;                            ///< spheres
+  std::int64_t weighing = 0;                         ///< those of them that have mass
   Vec3 about = Vec3::Zero();                         ///< the point: where the first granule was (m)
   double mass = 0;                                   ///< kg
   Vec3 first = Vec3::Zero();                         ///< sum of m (x - about)
@@ -29,26 +50,15 @@ struct MassProperties {
   double spin = 0;                                   ///< sum of 2/5 m r^2, each granule's own inertia
   std::int64_t held = 0;                             ///< granules that touch a wall that stands still
 
-  void add(double m, const Vec3& x, double r, int sign = 1, bool is_held = false);
+  /// turning_radius: see SolidBodies.
+  void add(const GranuleMass& granule, double turning_radius, int sign = 1);
   void add(const MassProperties& other, int sign = 1);
-  Vec3 centre() const { return about + first / mass; }                  ///< m; undefined for no mass
-  Eigen::Matrix3d inertia() const;                                      ///< about the centre of mass, kg m^2
-  MassProperties seen_from(const Pose& here, const Pose& there) const;  ///< the same granules in another frame
-};
+  Vec3 centre() const { return weighing > 0 ? Vec3(about + first / mass) : about; }  ///< m
+  Eigen::Matrix3d inertia() const;                                                   ///< about the centre of mass, kg m^2
+  MassProperties seen_from(const Pose& here, const Pose& there) const;               ///< the same granules in another frame
 
-/// A locked granule, in the frame of its body.
-struct GranuleMass {
-  double mass;
-  Vec3 position;
-  double radius;
-  bool held = false;  ///< it touches a wall that stands still
-};
-
-/// A granule that is to be locked, or is given back with this motion. World frame.
-struct MovingGranule {
-  double mass, radius;
-  Vec3 position, velocity, spin;
-  bool held = false;  ///< it touches a wall that stands still
+ private:
+  void drop_rounding();
 };
 
 struct SolidBody {
@@ -88,6 +98,7 @@ struct SolidBody {
     for (int k = 0; k < 4; ++k) visit(turn.coeffs()[k]);
     pose = Pose(origin, turn);
     visit(mass.count);
+    visit(mass.weighing);
     visit(mass.held);
     vector(mass.about);
     visit(mass.mass);
@@ -114,7 +125,7 @@ struct SolidBody {
     vector(extra_load);
   }
 
-  bool is_one_granule() const { return mass.count == 1 && !spanned; }
+  bool is_one_sphere() const { return mass.count == 1 && !spanned; }
   RigidPart part() const;  ///< this rank's part, world frame
   FreeAxes free_axes() const { return free_axes(spans); }
   static FreeAxes free_axes(const std::array<bool, 3>& spans);
@@ -129,8 +140,12 @@ struct SolidBody {
     pressed = true;
     extra_load += (extra - extra_load) / steps_of_mean;
   }
-  /// A body of one granule, which stands at this place of the world: its frame becomes the world's.
-  void reframe_one(const GranuleMass& in_world);
+  /// A body of one sphere, which stands at this place of the world: its frame becomes the world's.
+  void reframe_one(const GranuleMass& in_world, double turning_radius);
+  /// How many granules the whole is, over all ranks.
+  double granules() const {
+    return mass.weighing > 0 ? motion.mass() * static_cast<double>(mass.count) / mass.mass : static_cast<double>(mass.count);
+  }
 
   // one time step (theory.md#body-integrator)
   void kick(const Vec3& force, const Vec3& torque, double dt) { motion.kick(force, torque, dt); }
@@ -184,6 +199,9 @@ class SolidBodies {
   /// it has of inertia is far below that of two granules side by side, and far above what rounding leaves of none.
   double turning_radius(double radius) const { return granules_turn_ ? radius : 1e-3 * radius; }
 
+  /// As its body takes it up.
+  RigidPart part_of(const MovingGranule& granule) const;
+
   /// Edges of the periodic box, 0 where it is not periodic (m).
   void set_periods(const Vec3& periods) { periods_ = periods; }
   const Vec3& periods() const { return periods_; }
@@ -209,8 +227,10 @@ class SolidBodies {
   void shift(int body, const GranuleMass& granule, const Vec3& to) {
     MassProperties& sums = this->body(body).mass;
     const double radius = turning_radius(granule.radius);
-    sums.add(granule.mass, to, radius, +1, granule.held);
-    sums.add(granule.mass, granule.position, radius, -1, granule.held);
+    GranuleMass there = granule;
+    there.position = to;
+    sums.add(there, radius, +1);
+    sums.add(granule, radius, -1);
   }
 
   /// The same by any way: the body's centre keeps its velocity, and the body its spin. Its motion is to be settled.

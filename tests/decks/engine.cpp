@@ -16,6 +16,7 @@
 #include "fix.h"
 #include "fix_contact_history.h"
 #include "fix_contact_history_mesh.h"
+#include "fix_multisphere.h"
 #include "group.h"
 #include "input.h"
 #include "lammps.h"
@@ -114,10 +115,30 @@ State Engine::state() const {
   for (int i = 0; i < a->nlocal; ++i)
     rows.push_back({a->tag[i],
                     {vec(a->x[i]), vec(a->v[i]), vec(a->omega[i]), vec(a->f[i]), vec(a->torque[i]), a->radius[i], a->rmass[i],
-                     a->type[i], a->mask[i]}});
+                     a->type[i], a->mask[i], a->molecule ? std::max(a->molecule[i], 0) : 0}});
   State state;
   for (const Row& r : everywhere(rows)) state[r.tag] = r.g;
   return state;
+}
+
+ClumpRows Engine::clumps() const {
+  struct Row {
+    int number, width;
+    double of_row[100];
+  };
+  std::vector<Row> rows;
+  for (int f = 0; f < lmp_->modify->nfix; ++f) {
+    auto* fix = dynamic_cast<LAMMPS_NS::FixMultisphere*>(lmp_->modify->fix[f]);
+    if (!fix) continue;
+    for (int k = 0; k < fix->data().n_body(); ++k) {
+      Row r{fix->data().tag(k), 0, {}};
+      r.width = fix->data().prop().pushElemToBuffer(k, r.of_row, LAMMPS_NS::OPERATION_COMM_EXCHANGE, false, false, false);
+      rows.push_back(r);
+    }
+  }
+  ClumpRows all;
+  for (const Row& r : everywhere(rows)) all[r.number] = std::vector<double>(r.of_row, r.of_row + r.width);
+  return all;
 }
 
 Histories Engine::histories() {

@@ -26,8 +26,11 @@ struct Granule {
   Vec x, v, omega, f, torque;
   double radius, mass;
   int type, mask;
+  int clump = 0;  ///< that it is a sphere of
 };
 
+/// What fix multisphere keeps of each clump, as numbers, by the clump's number; equal on all ranks.
+using ClumpRows = std::map<int, std::vector<double>>;
 /// Everything a granule has, by tag; equal on all ranks.
 using State = std::map<int, Granule>;
 /// History of each contact (tag, partner) as `tag` sees it; mesh contacts have the negative triangle ID - 1 as partner.
@@ -43,6 +46,7 @@ class Engine {
   void run(const std::string& deck);  ///< lines of a deck
   State state() const;
   Histories histories();                         ///< granule-granule and granule-mesh
+  ClumpRows clumps() const;                      ///< those that the engine moves
   double vector(const std::string& fix, int n);  ///< f_ID[n], n from 1; n = 0: f_ID
   double variable(const std::string& name);      ///< an equal-style variable
   int group_bit(const std::string& name) const;
@@ -78,6 +82,7 @@ struct Bed {
   friend void PrintTo(const Bed& bed, std::ostream* out) { *out << bed.name; }
 };
 
+std::string grid();                    ///< how a deck cuts the box
 std::string head(const Bed& bed);      ///< up to the box
 std::string body(const Bed& bed);      ///< material, walls, gravity
 std::string read_bed(const Bed& bed);  ///< reads the settled bed (made once, see settled())

@@ -157,6 +157,22 @@ class SmallAtoms : public Atoms {
   std::vector<std::string> texts_;
 };
 
+/// None.
+class SmallClumps : public Clumps {
+ public:
+  int count() const override { return 0; }
+  Clump clump(int) const override { return {}; }
+  int find(int) const override { return -1; }
+  double largest() const override { return 0; }
+  void know_largest(double) override {}
+  int highest_number() const override { return 0; }
+  void keep_number(int) override {}
+  Clump take(int) override { return {}; }
+  void put(const Clump&, int) override {}
+  void set_clump(int, int) override {}
+  void join_image(int, int) override {}
+};
+
 /// A linear spring and dashpot along the normal; along the surface a spring whose length is the contact's history, held by
 /// Coulomb's friction.
 class SmallContacts : public Contacts {
@@ -340,6 +356,7 @@ class SmallWorld {
 
   SmallDeck deck;
   SmallAtoms atoms;
+  SmallClumps clumps;
   SmallContacts contacts;
   SmallWalls walls;
   SmallInsertions insertions;
@@ -347,7 +364,7 @@ class SmallWorld {
   SmallRun run;
   SmallMemory memory;
 
-  Ports ports() { return {atoms, contacts, walls, insertions, ranks, run, memory}; }
+  Ports ports() { return {atoms, clumps, contacts, walls, insertions, ranks, run, memory}; }
 
   /// A granule, on the rank that owns its place; -1 elsewhere.
   int add(int tag, const Vec3& place, double radius, const Vec3& velocity = Vec3::Zero(), const Vec3& spin = Vec3::Zero());

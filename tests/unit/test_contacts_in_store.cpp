@@ -192,7 +192,7 @@ TEST(ContactsInStore, bodies_that_meet_are_one_at_once) {
   };
   for (const int body : {1, 2}) {
     SolidBody b;
-    b.mass.add(1, Vec3(body, 0, 0), 0.5);
+    b.mass.add({1, Vec3(body, 0, 0), 0.5}, 0.5);
     p.bodies.found(b);
   }
   p.store.share(1, true);
@@ -211,7 +211,7 @@ TEST(ContactsInStore, a_body_comes_apart_where_what_was_stored_goes) {
   // a bar of 3 x 3 x 20 with its middle layer taken out
   StoreOfPacking p(2.0);
   SolidBody body;
-  for (int k = 0; k < 180; ++k) body.mass.add(1, Vec3(k / 9, k / 3 % 3, k % 3), 0.5);
+  for (int k = 0; k < 180; ++k) body.mass.add({1, Vec3(k / 9, k / 3 % 3, k % 3), 0.5}, 0.5);
   p.bodies.found(body);
   for (int k = 0; k < 180; ++k) {
     StoredGranule g = granule(k + 1, 1, Vec3(k / 9, k / 3 % 3, k % 3), 0.5);

@@ -29,9 +29,11 @@ SmallDeck ranks_along_x(int ranks) {
 template <class Visit>
 void each_free_number(StoredGranule& g, Visit visit) {
   g.each_number([&](auto& x) {
-    const void* const used[] = {&g.position[0],    &g.position[1],    &g.position[2],    &g.radius, &g.mass, &g.layout,
-                                &g.load_change[0], &g.load_change[1], &g.load_change[2], &g.type,   &g.held};
-    if (std::find(std::begin(used), std::end(used), static_cast<const void*>(&x)) == std::end(used)) visit(x);
+    std::vector<const void*> used = {&g.position[0], &g.position[1],    &g.position[2],    &g.radius,         &g.mass,
+                                     &g.layout,      &g.load_change[0], &g.load_change[1], &g.load_change[2], &g.type,
+                                     &g.held,        &g.clump,          &g.spheres,        &g.has_clump};
+    g.each_of_clump([&](double& n) { used.push_back(&n); });
+    if (std::find(used.begin(), used.end(), static_cast<const void*>(&x)) == used.end()) visit(x);
   });
 }
 

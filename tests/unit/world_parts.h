@@ -60,7 +60,7 @@ struct WorldParts : CullingParts {
   }
   /// What is another rank's goes there; false if nothing is, on any rank. Collective.
   bool send_home() {
-    const bool some = world.ranks.any(handover.find_leaving());
+    const bool some = world.ranks.any(handover.find_leaving(deep.take_away_from_home()));
     if (some) handover.send_home();
     return some;
   }

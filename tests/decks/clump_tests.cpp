@@ -1,0 +1,233 @@
+// Clumps, granules of several spheres: locked, stored, freed and moved as one.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+#include <sstream>
+
+#include "atom.h"
+#include "engine.h"
+#include "lammps.h"
+
+namespace decks {
+namespace {
+
+constexpr const char* contact = "model hertz tangential history rolling_friction epsd2";
+constexpr double diameter = 0.0024;  // m, of the smallest spheres
+
+/// A bed of clumps, some sphere in their midst or none.
+struct ClumpBed {
+  std::string name, templates, shares;
+  int granules;  // spheres and clumps
+  bool periodic = false;
+
+  friend void PrintTo(const ClumpBed& b, std::ostream* out) { *out << b.name; }
+};
+
+const std::string three = "nspheres 3 ntry 100000 spheres 0 0 0 0.0012 0.0013 0 0 0.0010 0.0005 0.0011 0 0.0009 type 1\n";
+/// Rods, whose ends are far from each other.
+std::string nine() {
+  std::ostringstream s;
+  s << "nspheres 9 ntry 100000 spheres";
+  for (int k = 0; k < 9; ++k) s << ' ' << 0.0006 * (k - 4) << " 0 0 0.0010";
+  s << " type 2\n";
+  return s.str();
+}
+
+ClumpBed bed_of(const std::string& name) {
+  const std::string of_three = "fix t1 all particletemplate/multisphere 15485863 atom_type 1 density constant 2500 " + three,
+                    of_nine = "fix t2 all particletemplate/multisphere 15485867 atom_type 1 density constant 2500 " + nine(),
+                    sphere =
+                        "fix t3 all particletemplate/sphere 49979687 atom_type 1 density constant 2500 radius constant 0.0013\n";
+  if (name == "rods") return {name, of_three + of_nine, "2 t1 0.5 t2 0.5", 220};
+  if (name == "mixed") return {name, of_three + of_nine + sphere, "3 t1 0.4 t2 0.2 t3 0.4", 350};
+  return {name, of_three, "1 t1 1.0", 400, name == "periodic"};
+}
+
+constexpr double side = 0.026;
+
+std::string head(const ClumpBed& b) {
+  return std::string("atom_style granular\natom_modify map array\nboundary ") + (b.periodic ? "p p f" : "f f f") +
+         "\nnewton off\ncommunicate single vel yes\nunits si\nprocessors " + grid() + "\n";
+}
+
+std::string body(const ClumpBed& b) {
+  std::ostringstream s;
+  s << "fix m1 all property/global youngsModulus peratomtype 5.e6\n"
+       "fix m2 all property/global poissonsRatio peratomtype 0.3\n"
+       "fix m3 all property/global coefficientRestitution peratomtypepair 1 0.3\n"
+       "fix m4 all property/global coefficientFriction peratomtypepair 1 0.5\n"
+       "fix m5 all property/global coefficientRollingFriction peratomtypepair 1 0.1\n"
+    << "pair_style gran " << contact << "\npair_coeff * *\ntimestep 2e-5\nfix grav all gravity 9.81 vector 0 0 -1\n";
+  const std::string wall = " all wall/gran " + std::string(contact) + " primitive type 1 ";
+  for (const char* dim : {"x", "y"})
+    if (!b.periodic)
+      s << "fix " << dim << "1" << wall << dim << "plane 0\nfix " << dim << "2" << wall << dim << "plane " << side << "\n";
+  s << "fix z1" << wall << "zplane 0\n";
+  return s.str();
+}
+
+constexpr const char* moved =
+    "fix spheres all nve/sphere\nfix clumps all multisphere allow_group_and_set yes\nthermo 100000\nthermo_modify norm no lost "
+    "ignore\n";
+
+/// Poured and settled once for all tests of a process.
+std::string settled(const ClumpBed& b) {
+  static std::set<std::string> made;
+  const std::string file = "clumps_" + b.name + ".restart";
+  if (made.count(b.name)) return file;
+  Engine e;
+  const double rim = b.periodic ? 0 : 0.002;
+  std::ostringstream s;
+  s << head(b) << "region reg block " << -rim << ' ' << side + rim << ' ' << -rim << ' ' << side + rim << " -0.002 0.2\n"
+    << "create_box 1 reg\nneighbor 0.0006 bin\nneigh_modify delay 0\n"
+    << body(b) << b.templates << "fix dist all particledistribution/discrete 32452867 " << b.shares << "\n"
+    << "region pour block 0.002 " << side - 0.002 << " 0.002 " << side - 0.002 << " 0.005 0.19\n"
+    << "fix ins all insert/pack seed 32452843 distributiontemplate dist maxattempt 300 insert_every once overlapcheck yes all_in "
+       "yes "
+       "orientation random vel constant 0 0 -0.5 region pour ntry_mc 10000 particles_in_region "
+    << b.granules << "\n"
+    << moved << "run 12000\nunfix ins\nfix visc all viscous 0.002\nrun 9000\nunfix visc\nrun 5000\nwrite_restart " << file
+    << "\n";
+  e.run(s.str());
+  made.insert(b.name);
+  return file;
+}
+
+std::string read(const ClumpBed& b, const std::string& file = "") {
+  return head(b) + "read_restart " + (file.empty() ? settled(b) : file) + "\nneighbor 0.0004 bin\nneigh_modify delay 0\n" +
+         body(b) + moved;
+}
+
+/// Largest difference of what the engine moves clumps by, over the largest of each number; rows must be the same.
+double largest_difference(const ClumpRows& a, const ClumpRows& b) {
+  if (a.size() != b.size()) return HUGE_VAL;
+  double most = 0;
+  for (const auto& [number, row] : a) {
+    const auto other = b.find(number);
+    if (other == b.end() || other->second.size() != row.size()) return HUGE_VAL;
+    for (std::size_t k = 0; k < row.size(); ++k) most = std::max(most, std::abs(row[k] - other->second[k]));
+  }
+  return most;
+}
+
+std::size_t clumps_of(const State& atoms) {
+  std::set<int> clumps;
+  for (const auto& a : atoms) clumps.insert(a.second.clump);
+  clumps.erase(0);
+  return clumps.size();
+}
+
+/// Nothing is lost: as many spheres as there were, atoms or stored, and every clump whose spheres are free is moved.
+void expect_whole(Engine& e, std::size_t spheres) {
+  const State atoms = e.state();
+  EXPECT_EQ(static_cast<double>(atoms.size()) + e.vector("cull", 3), static_cast<double>(spheres));
+  EXPECT_EQ(e.clumps().size(), clumps_of(atoms));
+  EXPECT_NEAR(e.vector("cull", 11), 0, 1e-12 * e.vector("cull", 23)) << "mass error";
+}
+
+struct Case {
+  std::string bed, keywords;
+  friend void PrintTo(const Case& c, std::ostream* out) { *out << c.bed << ", " << c.keywords; }
+};
+
+class Clumps : public testing::TestWithParam<Case> {};
+
+/// Invariant I3.
+TEST_P(Clumps, AreCulledAndRestoredToTheBit) {
+  const ClumpBed bed = bed_of(GetParam().bed);
+  const std::string deck = read(bed), looks = "run 100\nrun 0\n";  // the last look chooses
+  Engine never, culled;
+  never.run(deck + looks);
+  culled.run(deck + "fix cull all solid/cull every 50 calm 2 speed 0.05 tolerance 12 0 " + GetParam().keywords + "\n" + looks);
+  const State all = never.state();
+  const ClumpRows rows = never.clumps();
+  const double interior = culled.vector("cull", 3), interface = culled.vector("cull", 2);
+  EXPECT_GT(interior, 0.02 * static_cast<double>(all.size())) << "nothing was stored: the test shows nothing";
+  EXPECT_LT(culled.clumps().size(), rows.size());
+  expect_whole(culled, all.size());
+  culled.run("unfix cull\n");
+  const State back = culled.state();
+  expect_same_granules(all, back);
+  const double rounding = bed.periodic ? 1e-16 * side : 0.0;  // of what has been in another periodic image
+  EXPECT_LE(largest_difference(all, back, &Granule::x), rounding);
+  EXPECT_EQ(largest_difference(all, back, &Granule::v), 0.0);
+  EXPECT_EQ(largest_difference(all, back, &Granule::omega), 0.0);
+  for (const auto& a : all) EXPECT_EQ(a.second.clump, back.at(a.first).clump);
+  EXPECT_LE(largest_difference(rows, culled.clumps()), rounding);
+
+  never.run("run 0\n");
+  culled.run("run 0\n");
+  const State fa = never.state(), fb = culled.state();
+  const double contact_force = 13 * 1e-4 * 9.81;
+  EXPECT_LE(largest_difference(fa, fb, &Granule::f), 1e-12 * contact_force);
+  const Histories ha = never.histories(), hb = culled.histories();
+  EXPECT_EQ(ha.size(), hb.size());
+  double most = 0, scale = 0;
+  for (const auto& h : ha) {
+    const auto other = hb.find(h.first);
+    ASSERT_NE(other, hb.end()) << "the history of " << h.first.first << " with " << h.first.second << " was lost";
+    for (std::size_t d = 0; d < h.second.size(); ++d) {
+      most = std::max(most, std::abs(h.second[d] - other->second[d]));
+      scale = std::max(scale, std::abs(h.second[d]));
+    }
+  }
+  EXPECT_LE(most, 1e-12 * scale);
+  never.run("run 100\n");
+  culled.run("run 100\n");
+  const double drift = largest_difference(never.state(), culled.state(), &Granule::x);
+  EXPECT_LE(drift, 1e-9 * diameter);
+  if (never.rank() == 0)
+    std::printf("%s: %g interior, %g interface of %zu spheres, %zu clumps; dx/d after 100 steps %.3g\n", bed.name.c_str(),
+                interior, interface, all.size(), rows.size(), drift / diameter);
+}
+
+INSTANTIATE_TEST_SUITE_P(Beds, Clumps,
+                         testing::Values(Case{"three", "exterior live depth 1.5"}, Case{"three", "exterior sleep depth 0"},
+                                         Case{"rods", "exterior sleep depth 0"}, Case{"rods", "exterior live depth 1"},
+                                         Case{"mixed", "exterior sleep depth 0"}, Case{"mixed", "exterior live depth 1.5"},
+                                         Case{"periodic", "exterior sleep depth 0"}),
+                         [](const testing::TestParamInfo<Case>& info) {
+                           return info.param.bed + (info.param.keywords.find("live") != std::string::npos ? "_live" : "_sleep");
+                         });
+
+class StruckClumps : public testing::TestWithParam<Case> {};
+
+/// A ball falls on them: they wake, move and sleep again.
+TEST_P(StruckClumps, LoseNothing) {
+  const ClumpBed bed = bed_of(GetParam().bed);
+  Engine e;
+  e.run(read(bed) + "fix cull all solid/cull every 50 " + GetParam().keywords + "\nrun 500\n");
+  const std::size_t spheres = e.state().size() + static_cast<std::size_t>(e.vector("cull", 3)) + 1;
+  e.run(
+      "create_atoms 1 single 0.013 0.013 0.06 units box\nregion above block 0.01 0.016 0.01 0.016 0.055 0.065 units box\n"
+      "group ball region above\nset group ball diameter 0.004\nset group ball density 2500\nvelocity ball set 0 0 -1\n");
+  e.run("run 0\n");
+  const double mass = e.vector("cull", 23);
+  double least = 1;
+  for (int k = 0; k < 10; ++k) {
+    e.run("run 1000\n");
+    expect_whole(e, spheres);
+    EXPECT_NEAR(e.vector("cull", 23), mass, 1e-12 * mass);
+    least = std::min(least, e.vector("cull", 3) / static_cast<double>(spheres));
+  }
+  EXPECT_GT(e.vector("cull", 7), 0) << "nothing woke: the test shows nothing";
+  const double interior = e.vector("cull", 3);
+  EXPECT_GT(interior, 0.1 * static_cast<double>(spheres));
+  e.run("unfix cull\nrun 100\n");
+  EXPECT_EQ(e.state().size(), spheres);
+  EXPECT_EQ(e.clumps().size(), clumps_of(e.state()));
+}
+
+INSTANTIATE_TEST_SUITE_P(Beds, StruckClumps,
+                         testing::Values(Case{"three", "exterior live depth 1.5"}, Case{"three", "exterior sleep"},
+                                         Case{"rods", "exterior sleep depth 0"}, Case{"mixed", "exterior sleep"},
+                                         Case{"mixed", "exterior live depth 1"}, Case{"periodic", "exterior sleep"},
+                                         Case{"three", "exterior sleep store compact"}),
+                         [](const testing::TestParamInfo<Case>& info) {
+                           return info.param.bed + (info.param.keywords.find("live") != std::string::npos ? "_live" : "_sleep") +
+                                  (info.param.keywords.find("compact") != std::string::npos ? "_compact" : "");
+                         });
+
+}  // namespace
+}  // namespace decks
