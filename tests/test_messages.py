@@ -223,7 +223,8 @@ class MissedPhysics(Case):
                     "grow adapt", "radii that change (fix adapt) would leave the culled granules behind")
 
     def test_multisphere(self):
-        self.missed(["fix clumps all multisphere"], "clumps multisphere", "multisphere clumps are not supported yet")
+        self.missed(["fix clumps all multisphere/nointegration"], "clumps multisphere/nointegration",
+                    "clumps that break, or that another program moves, would miss those that are culled")
 
     def test_rigid(self):
         self.missed(["fix clump all rigid single"], "clump rigid", "rigid clumps of granules are not supported yet")

@@ -56,7 +56,13 @@ fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 ra
 fix dist all particledistribution/discrete 32452843 1 t1 1
 region above block 0.003 0.018 0.003 0.018 0.045 0.055 units box
 """
+CLUMPS = ("fix clumps all multisphere allow_group_and_set yes\n" +
+          INSERTED.replace("particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.001",
+                           "particletemplate/multisphere 15485863 atom_type 1 density constant 2500 nspheres 3 ntry 100000 "
+                           "spheres 0 0 0 0.001 0.001 0 0 0.001 0 0.001 0 0.0008 type 1"))
 INSERTION = "seed 32452867 distributiontemplate dist maxattempt 200 overlapcheck yes all_in yes"
+FEW_CLUMPS = (f"fix few all insert/pack {INSERTION} orientation random insert_every once vel constant 0 0 -0.1 region above "
+              "ntry_mc 10000 particles_in_region 3\n")
 STREAM = ("fix face all mesh/surface/planar file {place}/inlet.stl type 1\n"
           "fix x all insert/stream seed 32452867 distributiontemplate dist nparticles 5 particlerate 100000 "
           "overlapcheck yes all_in no vel constant 0 0 -0.5 insertion_face face extrude_length 0.01\n")
@@ -129,6 +135,10 @@ FIXES = {
     "particledistribution/discrete": Row(INSERTED),
     "particledistribution/discrete/massbased": Row(INSERTED.replace("discrete", "discrete/massbased")),
     "particledistribution/discrete/numberbased": Row(INSERTED.replace("discrete", "discrete/numberbased")),
+    "particletemplate/multiplespheres": Row(INSERTED.replace(
+        "sphere 15485863 atom_type 1 density constant 2500 radius constant 0.001",
+        "multiplespheres 15485863 atom_type 1 density constant 2500 nspheres 2 ntry 100000 spheres 0 0 0 0.001 0.003 0 0 0.001")),
+    "particletemplate/multisphere": Row(CLUMPS),
     "particletemplate/sphere": Row(INSERTED),
     "print": Row('fix x all print 50 "$(step)" file {place}/print'),
     "property/atom": Row("fix x all property/atom colour scalar yes no no 3\ncompute sum ball reduce sum f_x", "c_sum"),
@@ -141,6 +151,7 @@ FIXES = {
     "ave/correlate": Row("variable z equal bound(ball,zmin)\nfix x all ave/correlate 10 5 50 v_z ave running", "f_x[1][3]"),
     "ave/time": Row("variable z equal bound(ball,zmin)\nfix x all ave/time 10 5 50 v_z", "f_x"),
     # they move granules
+    "multisphere": Row(CLUMPS + FEW_CLUMPS, granules=353),
     "nve/sphere": Row("", "vcm(ball,z)"),
     # they measure atoms only
     "ave/euler": Row("fix x all ave/euler nevery 50 cell_size_relative 4.5 parallel no"),
@@ -195,10 +206,14 @@ COMPUTES = {
     # sums over atoms
     "displace/atom": Row("compute a all displace/atom\ncompute x ball reduce max c_a[4]", "c_x", of_ball=True),
     "erotate": Row("compute x all erotate", "c_x", "f_cull[28]"),
+    "erotate/multisphere": Row(CLUMPS + FEW_CLUMPS + "compute x all erotate/multisphere", "c_x", granules=353),
     "erotate/sphere": Row("compute x all erotate/sphere", "c_x", "f_cull[28]"),
     "erotate/sphere/atom": Row("compute a all erotate/sphere/atom\ncompute x all reduce sum c_a", "c_x", "f_cull[28]"),
     "ke": Row("compute x all ke", "c_x", "f_cull[27]"),
     "ke/atom": Row("compute a all ke/atom\ncompute x all reduce sum c_a", "c_x", "f_cull[27]"),
+    "ke/multisphere": Row(CLUMPS + FEW_CLUMPS + "compute x all ke/multisphere", "c_x", granules=353),
+    "multisphere": Row(CLUMPS + FEW_CLUMPS + "compute a all multisphere property vcm\ncompute x all reduce min c_a[3]", "c_x",
+                       granules=353),
     "property/atom": Row("compute a all property/atom mass\ncompute x all reduce sum c_a", "c_x", "c_x+f_cull[5]"),
     "reduce": Row("variable one atom 1\ncompute x all reduce sum v_one", "c_x", "c_x+f_cull[3]"),
     "reduce/region": Row("compute a all property/atom mass\ncompute x all reduce/region left sum c_a", "c_x"),
@@ -273,8 +288,8 @@ LIQUID = "".join(f"fix l{k} all property/global {c} scalar {x}\n" for k, (c, x) 
     "maxSeparationDistanceRatio": 1.1, "maxLiquidContent": 10, "lbVolumeFraction": 0.05}.items())) + \
     "fix angle all property/global contactAngle peratomtype 0.5\n"
 REFUSED = {  # lines of a deck, and what solid/cull says
-    "compute x all erotate/multisphere": "compute x (erotate/multisphere): multisphere clumps are not supported yet",
-    "compute x all ke/multisphere": "compute x (ke/multisphere): multisphere clumps are not supported yet",
+    "fix clumps all multisphere\ncompute x all multisphere/single id 1 property masstotal":
+        "compute x (multisphere/single): is of one clump, which may be culled",
     "compute x all group/group all pair no": "compute x (group/group): LIGGGHTS's granular contacts do not support it",
 }
 

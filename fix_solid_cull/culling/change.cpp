@@ -104,6 +104,7 @@ void Change::make(Look& look, Phase phase) {
   follow_box();
   // another fix may have deleted granules in this hook
   if (phase == Phase::stepping && bed_.census.something_locked()) forget_lost();
+  if (bed_.clumps.possible && bed_.census.something_locked()) wake_counted_clumps();
   const Occasion now = begin(look);
   const bool overlaps = now.made && meet_new_granules(phase);
   bed_.memory.freed(p_.exchange.forget_past_motions());
@@ -149,6 +150,19 @@ void Change::make(Look& look, Phase phase) {
   fit_memory(phase);
   p_.motion.refresh();
   p_.motion.give_velocities();
+}
+
+/// Fixes that insert, or count what passes, count clumps where the engine moves them, and spheres else.
+void Change::wake_counted_clumps() {
+  for (const Box& box : p_.closure.opened(bed_.run.skin)) {
+    for (int i = 0; i < bed_.atoms.owned; ++i)
+      if (bed_.shell[i].locked && bed_.shell[i].clump && box.holds(bed_.atoms.place(i)))
+        bed_.wake.ask(bed_.atoms.place(i), 0.5 * bed_.atoms.radius[i]);
+    bed_.stored.for_each_in_box(box.lo, box.hi, [&](const Resident& g) {
+      const Vec3 x = bed_.solid.in_world(g);
+      if (box.holds(x) && bed_.solid.store().get(g.tag).clump) bed_.wake.ask(x, 0.5 * g.radius);
+    });
+  }
 }
 
 /// What was made inside a stored granule cannot stay. Stored ones come back for each fix that inserts, so nothing that LIGGGHTS

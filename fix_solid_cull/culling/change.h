@@ -48,6 +48,7 @@ class Change {
   void follow_box();
   void move_cuts();
   void take_subdomains();
+  void wake_counted_clumps();
   bool meet_new_granules(Phase phase);
   bool stores_asleep() const;
   void close_shell(bool changes, bool& shell_changed);

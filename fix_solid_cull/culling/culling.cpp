@@ -282,7 +282,8 @@ void Culling::end_run() {
 /// Fixes that insert check for overlap with atoms only: where they put granules, stored ones become atoms in the change at this
 /// step, the one before, so that ranks see each other's.
 void Culling::open_for_insertion(std::int64_t step) {
-  if (bed_.census.something_stored() && bed_.insertions.any_due(step + 1 + bed_.run.reset_by))
+  const bool some = bed_.clumps.possible ? bed_.census.something_locked() : bed_.census.something_stored();
+  if (some && bed_.insertions.any_due(step + 1 + bed_.run.reset_by))
     bed_.run.ask_for_reneighbouring(step);
 }
 

@@ -34,17 +34,17 @@ class LockedClumps : public FollowsAtoms {
   }
 
   void to_world(std::int64_t tag, const Pose& pose) {
-    change(tag, [&](ClumpMass& lies) { lies = lies.in_world(pose); });
+    change(tag, [&](ClumpMass& lies) { lies.to_world(pose); });
   }
   void to_frame(std::int64_t tag, const Pose& pose) {
-    change(tag, [&](ClumpMass& lies) { lies = lies.in_frame(pose); });
+    change(tag, [&](ClumpMass& lies) { lies.to_frame(pose); });
   }
   void reframe(std::int64_t tag, const Pose& from, const Pose& to) {
-    change(tag, [&](ClumpMass& lies) { lies = lies.seen_from(from, to); });
+    change(tag, [&](ClumpMass& lies) { lies.reframe(from, to); });
   }
   /// The sphere stands elsewhere in its body.
   void shift(std::int64_t tag, const Vec3& by) {
-    change(tag, [&](ClumpMass& lies) { lies.centre += by; });
+    change(tag, [&](ClumpMass& lies) { lies.move(by); });
   }
 
   void grow(int) override {}

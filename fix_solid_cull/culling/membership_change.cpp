@@ -78,11 +78,18 @@ bool MembershipChange::still_rests(int i) const {
 }
 
 void MembershipChange::lock_what_was_chosen() {
+  // what fixes count there they count as clumps, or as spheres
+  std::vector<Box> counted;
+  if (bed_.clumps.possible) counted = p_.closure.opened(bed_.run.skin);
+  const auto is_counted = [&](int i) {
+    return bed_.clumps.of(i) && std::any_of(counted.begin(), counted.end(),
+                                            [&](const Box& box) { return box.holds(bed_.atoms.place(i)); });
+  };
   std::vector<char> locks(static_cast<std::size_t>(bed_.atoms.owned), 0);
   for (const std::int64_t tag : proposal_.chosen)
     // it may have left this rank or the simulation, too, or something wakes beside it
     if (const int* i = bed_.index.find(tag))
-      locks[*i] = !bed_.shell[*i].locked && !wakes_.in_ball(bed_.atoms.place(*i), bed_.scales.diameter()) && still_rests(*i);
+      locks[*i] = !bed_.shell[*i].locked && !is_counted(*i) && !wakes_.in_ball(bed_.atoms.place(*i), bed_.scales.diameter()) && still_rests(*i);
   bed_.clump_spheres.all_of(locks);
   std::vector<int> of_clumps;
   for (const std::int64_t tag : proposal_.chosen) {
@@ -128,7 +135,7 @@ void MembershipChange::lock_clumps(const std::vector<int>& locked) {
   for (std::size_t k = 0; k < whole.size(); ++k) {
     const int i = whole[k].second;
     Clump& c = clumps[k];
-    c.lies.centre = bed_.solid.nearest_image(c.lies.centre, atoms.place(i));
+    c.lies.move(bed_.solid.nearest_image(c.lies.centre, atoms.place(i)) - c.lies.centre);
     bed_.locked_clumps.put(atoms.tag[i], std::move(c));
   }
 }
@@ -204,7 +211,7 @@ void MembershipChange::leave_body(std::int64_t tag) {
 /// The engine moves the clump again whose mass the sphere has: with the motion that it had, or that of its body.
 void MembershipChange::give_clump_back(int sphere, int body, bool as_it_was, MovingGranule& given) {
   Clump c = bed_.locked_clumps.take(bed_.atoms.tag[sphere]);
-  c.lies = c.lies.in_world(bed_.solid.bodies().pose(body));
+  c.lies.to_world(bed_.solid.bodies().pose(body));
   const Twist& twist = bed_.solid.bodies().body(body).twist;
   if (!as_it_was) c.move_as(twist.at(c.lies.centre), twist.spin);
   given.velocity = c.velocity;

@@ -302,7 +302,7 @@ void Parcels::take_granule(std::int64_t tag, const Taken& t) {
   SolidBody& to = bed_.solid.body(at.body);
   to.feel_as(from);
   if (moving.clump) {
-    moving.clump->centre += to.pose.to_world(at.position) - x;  // it may stand in another periodic image now
+    moving.clump->move(to.pose.to_world(at.position) - x);  // it may stand in another periodic image now
     moving.clump = moving.clump->in_frame(to.pose);
   }
   const int* i = bed_.index.find(tag);

@@ -8,7 +8,6 @@ namespace {
 constexpr Measure exact = Measure::exact, atoms_only = Measure::atoms_only, contacts = Measure::contacts, whole = Measure::whole,
                   refused = Measure::refused;
 
-constexpr const char* no_clumps = "multisphere clumps are not supported yet";
 constexpr const char* no_single_pairs = "LIGGGHTS's granular contacts do not support it";
 constexpr const char* of_molecules = "adds up whole molecules, and culled granules would be left out";
 
@@ -19,10 +18,13 @@ constexpr ComputeStyle compute_styles[] = {
 
     {"displace/atom", atoms_only, ""},
     {"erotate", atoms_only, ""},
+    {"erotate/multisphere", atoms_only, ""},
     {"erotate/sphere", atoms_only, ""},
     {"erotate/sphere/atom", atoms_only, ""},
     {"ke", atoms_only, ""},
     {"ke/atom", atoms_only, ""},
+    {"ke/multisphere", atoms_only, ""},
+    {"multisphere", atoms_only, ""},
     {"property/atom", atoms_only, ""},
     {"reduce", atoms_only, ""},
     {"reduce/region", atoms_only, ""},
@@ -53,10 +55,8 @@ constexpr ComputeStyle compute_styles[] = {
 
     {"bond/local", refused, "bonds would miss the culled granules"},
     {"erotate/asphere", refused, "only spheres are supported"},
-    {"erotate/multisphere", refused, no_clumps},
     {"group/group", refused, no_single_pairs},
-    {"ke/multisphere", refused, no_clumps},
-    {"multisphere*", refused, no_clumps},
+    {"multisphere/single", refused, "is of one clump, which may be culled"},
     {"property/local", refused, no_single_pairs},
     {"reduce/sph", refused, "SPH would miss the culled granules"},
     {"rigid", refused, "rigid clumps of granules are not supported yet"},

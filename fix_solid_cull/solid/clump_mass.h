@@ -17,6 +17,10 @@ struct ClumpMass {
   Eigen::Matrix3d tensor() const { return about_axes(inertia); }
   /// Sum of m x x^T about the centre (kg m^2).
   Eigen::Matrix3d second() const { return about_axes(Vec3::Constant(0.5 * inertia.sum()) - inertia); }
+  void move(const Vec3& by) { centre += by; }
+  void to_world(const Pose& pose) { *this = in_world(pose); }
+  void to_frame(const Pose& pose) { *this = in_frame(pose); }
+  void reframe(const Pose& from, const Pose& to) { *this = seen_from(from, to); }
   ClumpMass in_world(const Pose& pose) const { return {pose.to_world(centre), pose.quaternion() * turn, inertia}; }
   ClumpMass in_frame(const Pose& pose) const { return {pose.to_frame(centre), pose.quaternion().conjugate() * turn, inertia}; }
   ClumpMass seen_from(const Pose& here, const Pose& there) const { return in_world(here).in_frame(there); }

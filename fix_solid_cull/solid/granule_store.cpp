@@ -361,7 +361,7 @@ void GranuleStore::shift_clump(std::int64_t tag, const Vec3& by) {
   const StoredGranule before = granule(s);
   if (!before.has_clump) return;
   StoredGranule after = before;
-  after.of_clump.centre += by;
+  after.of_clump.move(by);
   change(s, before, after);
 }
 

@@ -142,7 +142,7 @@ void Solid::adopt_swallowed() {
         return;
       }
       g.position = to.to_frame(from.to_world(g.position));
-      if (g.has_clump) g.of_clump = g.of_clump.seen_from(from, to);
+      if (g.has_clump) g.of_clump.reframe(from, to);
       g.load_change = turn * g.load_change;
       turn_contacts(g.tag, turn);
       if (sites_) {

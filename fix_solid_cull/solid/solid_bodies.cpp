@@ -266,7 +266,7 @@ SolidBodies::Place SolidBodies::lock(std::int64_t tag, const MovingGranule& gran
     const Vec3 before = first ? Vec3(Vec3::Zero()) : b.pose.to_world(b.mass.centre());
     MovingGranule here = granule;
     here.position = position;
-    if (here.clump) here.clump->centre += position - granule.position;
+    if (here.clump) here.clump->move(position - granule.position);
     add(b, part_of(here));
     GranuleMass mass{granule.mass, b.pose.to_frame(position), granule.radius, granule.held, std::nullopt};
     if (here.clump) mass.clump = here.clump->in_frame(b.pose);
@@ -404,7 +404,7 @@ void SolidBodies::split(const FrozenContacts& contacts, const MassOf& mass_of,
       }
       for (std::size_t at = 0; at < order.size(); ++at) {
         GranuleMass g = mass_of(order[at]);
-        if (g.clump) g.clump->centre += place[at] - g.position;
+        if (g.clump) g.clump->move(place[at] - g.position);
         g.position = place[at];
         off.mass.add(g, turning_radius(g.radius));
         if (int* member = member_.find(narrow_tag(order[at]))) *member = fresh;

@@ -1,13 +1,17 @@
 // Clumps, granules of several spheres: locked, stored, freed and moved as one.
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <cmath>
+#include <map>
 #include <set>
 #include <sstream>
 
 #include "atom.h"
 #include "engine.h"
+#include "fix_multisphere.h"
 #include "lammps.h"
+#include "modify.h"
 
 namespace decks {
 namespace {
@@ -228,6 +232,159 @@ INSTANTIATE_TEST_SUITE_P(Beds, StruckClumps,
                            return info.param.bed + (info.param.keywords.find("live") != std::string::npos ? "_live" : "_sleep") +
                                   (info.param.keywords.find("compact") != std::string::npos ? "_compact" : "");
                          });
+
+// ------------------------------------------------------------------------------------------------------------ a block in flight
+
+// columns of a clump's numbers, as fix multisphere has them
+constexpr std::size_t xcm = 1, vcm = 4, angmom = 7, masstotal = 20;
+
+struct Totals {
+  double mass = 0, motion = 0, turning_motion = 0;  // of which momenta may be sums
+  Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), turning = Eigen::Vector3d::Zero();
+  void add(double m, const double* x, const double* v, const Eigen::Vector3d& own) {
+    const Eigen::Vector3d p = m * Eigen::Vector3d(v[0], v[1], v[2]), l = Eigen::Vector3d(x[0], x[1], x[2]).cross(p) + own;
+    mass += m;
+    momentum += p;
+    turning += l;
+    motion += p.norm();
+    turning_motion += l.norm();
+  }
+};
+
+/// Of an engine that has all granules.
+Totals totals(Engine& e) {
+  Totals t;
+  for (const auto& [tag, a] : e.state())
+    if (a.clump == 0)
+      t.add(a.mass, a.x.data(), a.v.data(),
+            0.4 * a.mass * a.radius * a.radius * Eigen::Vector3d(a.omega[0], a.omega[1], a.omega[2]));
+  for (const auto& [number, row] : e.clumps())
+    t.add(row[masstotal], &row[xcm], &row[vcm], Eigen::Vector3d(row[angmom], row[angmom + 1], row[angmom + 2]));
+  return t;
+}
+
+/// Every granule has the velocity field of a rigid body.
+void throw_spinning(Engine& e, const Eigen::Vector3d& velocity, const Eigen::Vector3d& spin) {
+  const Eigen::Vector3d pole(0.5 * side, 0.5 * side, 0.01);
+  const auto at = [&](const double* x) -> Eigen::Vector3d {
+    return velocity + spin.cross(Eigen::Vector3d(x[0], x[1], x[2]) - pole);
+  };
+  LAMMPS_NS::Atom* atom = e.lammps()->atom;
+  for (int i = 0; i < atom->nlocal; ++i)
+    for (int d = 0; d < 3; ++d) {
+      atom->v[i][d] = at(atom->x[i])[d];
+      atom->omega[i][d] = spin[d];
+    }
+  LAMMPS_NS::Modify* modify = e.lammps()->modify;
+  auto& clumps = dynamic_cast<LAMMPS_NS::FixMultisphere&>(*modify->fix[modify->find_fix("clumps")]).data();
+  for (int k = 0; k < clumps.n_body(); ++k) {
+    double x[3], w[3] = {spin[0], spin[1], spin[2]};
+    clumps.xcm(x, k);
+    Eigen::Vector3d v = at(x);
+    clumps.set_v_body(k, v.data());
+    clumps.set_angmom_via_omega_body(k, w);
+  }
+}
+
+class BlockOfClumps : public testing::TestWithParam<Case> {};
+
+/// It flies and turns, and a ball strikes it: momentum and angular momentum are what they were.
+TEST_P(BlockOfClumps, KeepsItsMomenta) {
+  const ClumpBed bed = bed_of(GetParam().bed);
+  Engine e;
+  e.run(read(bed) +
+        "unfix grav\nunfix z1\nunfix x1\nunfix x2\nunfix y1\nunfix y2\nrun 0\ncreate_atoms 1 single 0.013 0.013 0.03 units box\n"
+        "region above block 0.012 0.014 0.012 0.014 0.029 0.031 units box\ngroup ball region above\n"
+        "set group ball diameter 0.003\nset group ball density 2500\nrun 0\n");
+  throw_spinning(e, {0.01, 0.02, 0.01}, {1, 2, -1});
+  e.run("velocity ball set 0 0 -0.8\n");
+  const Totals before = totals(e);
+  e.run("fix cull all solid/cull every 20 calm 2 speed 0.2 tolerance 100 0 " + GetParam().keywords + "\nrun 100\n");
+  const double interior = e.vector("cull", 3), spheres = static_cast<double>(e.state().size()) + interior;
+  EXPECT_GT(interior, 0.01 * spheres) << "nothing was stored: the test shows nothing";
+  for (int k = 0; k < 4; ++k) e.run("run 250\n");
+  EXPECT_GT(e.vector("cull", 7), 0) << "nothing woke";
+  e.run("unfix cull\n");
+  const Totals after = totals(e);
+  EXPECT_EQ(static_cast<double>(e.state().size()), spheres);
+  EXPECT_NEAR(after.mass, before.mass, 1e-12 * before.mass);
+  EXPECT_LE((after.momentum - before.momentum).norm(), 1e-12 * before.motion);
+  EXPECT_LE((after.turning - before.turning).norm(), 1e-12 * before.turning_motion);
+  if (e.rank() == 0)
+    std::printf("%s: %g of %g interior; momentum %.2g, angular momentum %.2g of what moves\n", bed.name.c_str(), interior, spheres,
+                (after.momentum - before.momentum).norm() / before.motion,
+                (after.turning - before.turning).norm() / before.turning_motion);
+}
+
+INSTANTIATE_TEST_SUITE_P(Beds, BlockOfClumps,
+                         testing::Values(Case{"three", "exterior live depth 1"}, Case{"three", "exterior sleep"},
+                                         Case{"mixed", "exterior sleep depth 0"}),
+                         [](const testing::TestParamInfo<Case>& info) {
+                           return info.param.bed + (info.param.keywords.find("live") != std::string::npos ? "_live" : "_sleep");
+                         });
+
+// ------------------------------------------------------------------------------------------------------------ decks
+
+constexpr const char* asleep = "fix cull all solid/cull every 50 exterior sleep depth 0\n";
+
+/// What is culled comes back from a restart file, clumps as they were.
+TEST(ClumpsInDecks, GoOnFromARestartFile) {
+  const ClumpBed bed = bed_of("mixed");
+  Engine on, again;
+  on.run(read(bed) + asleep + "run 600\nwrite_restart clumps.restart\n");
+  const double interior = on.vector("cull", 3);
+  EXPECT_GT(interior, 100);
+  again.run(read(bed, "clumps.restart") + asleep + "run 0\n");
+  expect_whole(again, on.state().size() + static_cast<std::size_t>(interior));
+  EXPECT_GT(again.vector("cull", 3), 0.5 * interior) << "what is at walls is an atom until it has felt them";
+  for (Engine* e : {&on, &again}) e->run("run 100\nunfix cull\nrun 0\n");
+  expect_same_granules(on.state(), again.state());
+  EXPECT_LE(largest_difference(on.state(), again.state(), &Granule::x), 1e-9 * diameter);
+  EXPECT_LE(largest_difference(on.clumps(), again.clumps()), 1e-9);
+}
+
+/// All clumps are stored as a run begins, and new ones are poured on them: no number is given twice, and as many come as in stock.
+TEST(ClumpsInDecks, AreInsertedOnWhatIsStored) {
+  const ClumpBed bed = bed_of("three");
+  const std::string pour = bed.templates + "fix dist all particledistribution/discrete 32452867 " + bed.shares +
+                           "\nregion pour block 0.003 0.023 0.003 0.023 0.04 0.08\n"
+                           "fix ins all insert/pack seed 32452843 distributiontemplate dist maxattempt 100 insert_every 1000 "
+                           "overlapcheck yes all_in yes orientation random vel constant 0 0 -0.5 region pour ntry_mc 10000 "
+                           "particles_in_region 30\n";
+  Engine stock, culled;
+  stock.run(read(bed) + "run 1000\n" + pour);
+  stock.run("run 2500\n");
+  culled.run(read(bed) + asleep + "run 1000\n");
+  EXPECT_GT(culled.vector("cull", 3), 1000);
+  culled.run(pour);
+  culled.run("run 2500\n");
+  const State all = stock.state();
+  expect_whole(culled, all.size());
+  culled.run("unfix cull\n");
+  const State back = culled.state();
+  EXPECT_EQ(back.size(), all.size());
+  EXPECT_EQ(clumps_of(back), clumps_of(all));
+  std::map<int, int> spheres;
+  for (const auto& [tag, a] : back) ++spheres[a.clump];
+  for (const auto& [number, n] : spheres) EXPECT_EQ(n, 3) << "spheres of clump " << number;
+}
+
+/// A clump that has lost a sphere is deleted, stored or not, as in stock.
+TEST(ClumpsInDecks, AreDeletedAsInStock) {
+  const ClumpBed bed = bed_of("three");
+  const std::string dig = "region hole block 0.008 0.016 0.008 0.016 0 0.008 units box\ndelete_atoms region hole compress no\nrun 300\n";
+  Engine stock, culled;
+  stock.run(read(bed) + "run 600\n" + dig);
+  culled.run(read(bed) + asleep + "run 600\n");
+  EXPECT_GT(culled.vector("cull", 3), 1000);
+  culled.run(dig);
+  const State all = stock.state();
+  expect_whole(culled, all.size());
+  culled.run("unfix cull\nrun 0\n");
+  expect_same_granules(all, culled.state());
+  EXPECT_EQ(stock.clumps().size(), culled.clumps().size());
+  EXPECT_LT(all.size(), 1200u);
+}
 
 }  // namespace
 }  // namespace decks
