@@ -61,6 +61,14 @@ class ClumpSpheres {
     unite(flags, [](char& one, char other) { one = one || other; });
   }
 
+  /// Of these owned atoms stay what is no sphere of a clump, and whole clumps. Collective.
+  void keep_whole(std::vector<int>& atoms) const {
+    std::vector<char> stays(static_cast<std::size_t>(bed_.atoms.owned), 0);
+    for (const int i : atoms) stays[i] = 1;
+    all_of(stays);
+    atoms.erase(std::remove_if(atoms.begin(), atoms.end(), [&](int i) { return !stays[i]; }), atoms.end());
+  }
+
   /// The clumps whose spheres this rank has, by number, as the rank that moves them knows them; `rest` is left out. Collective.
   std::map<int, Clump> near() const;
   /// Those with these numbers, which have a sphere here, as near() tells them; they leave the engine of the rank that moves them

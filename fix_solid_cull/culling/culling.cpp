@@ -283,8 +283,7 @@ void Culling::end_run() {
 /// step, the one before, so that ranks see each other's.
 void Culling::open_for_insertion(std::int64_t step) {
   const bool some = bed_.clumps.possible ? bed_.census.something_locked() : bed_.census.something_stored();
-  if (some && bed_.insertions.any_due(step + 1 + bed_.run.reset_by))
-    bed_.run.ask_for_reneighbouring(step);
+  if (some && bed_.insertions.any_due(step + 1 + bed_.run.reset_by)) bed_.run.ask_for_reneighbouring(step);
 }
 
 // ------------------------------------------------------------------------------------------------------------ state

@@ -169,12 +169,9 @@ bool DeepGranules::looks_for_some(const Occasion& now) {
 /// Of clumps, whose spheres other ranks may have, those of which all may go; they come together where the one is that has the
 /// mass.
 void DeepGranules::leave_out_parts_of_clumps(std::vector<int>& atoms) {
-  const std::size_t owned = static_cast<std::size_t>(bed_.atoms.owned);
-  std::vector<char> goes(owned, 0);
-  for (const int i : atoms) goes[i] = 1;
-  bed_.clump_spheres.all_of(goes);
-  atoms.erase(std::remove_if(atoms.begin(), atoms.end(), [&](int i) { return !goes[i]; }), atoms.end());
+  bed_.clump_spheres.keep_whole(atoms);
   if (bed_.ranks.count == 1) return;
+  const std::size_t owned = static_cast<std::size_t>(bed_.atoms.owned);
   std::vector<int> home(owned, bed_.ranks.count);
   for (std::size_t i = 0; i < owned; ++i)
     if (bed_.locked_clumps.find(bed_.atoms.tag[i])) home[i] = bed_.ranks.me;

@@ -82,23 +82,24 @@ void MembershipChange::lock_what_was_chosen() {
   std::vector<Box> counted;
   if (bed_.clumps.possible) counted = p_.closure.opened(bed_.run.skin);
   const auto is_counted = [&](int i) {
-    return bed_.clumps.of(i) && std::any_of(counted.begin(), counted.end(),
-                                            [&](const Box& box) { return box.holds(bed_.atoms.place(i)); });
+    return bed_.clumps.of(i) &&
+           std::any_of(counted.begin(), counted.end(), [&](const Box& box) { return box.holds(bed_.atoms.place(i)); });
   };
-  std::vector<char> locks(static_cast<std::size_t>(bed_.atoms.owned), 0);
-  for (const std::int64_t tag : proposal_.chosen)
-    // it may have left this rank or the simulation, too, or something wakes beside it
-    if (const int* i = bed_.index.find(tag))
-      locks[*i] = !bed_.shell[*i].locked && !is_counted(*i) && !wakes_.in_ball(bed_.atoms.place(*i), bed_.scales.diameter()) && still_rests(*i);
-  bed_.clump_spheres.all_of(locks);
-  std::vector<int> of_clumps;
+  std::vector<int> chosen;
   for (const std::int64_t tag : proposal_.chosen) {
     const int* i = bed_.index.find(tag);
-    if (!i || !locks[*i]) continue;
-    if (bed_.clumps.of(*i)) of_clumps.push_back(*i);
-    lock(*i);
-    changes_.locked.push_back(tag);
-    changes_.locked_anywhere[tag] = 1;
+    // it may have left this rank or the simulation, too, or something wakes beside it
+    if (i && !bed_.shell[*i].locked && !is_counted(*i) && !wakes_.in_ball(bed_.atoms.place(*i), bed_.scales.diameter()) &&
+        still_rests(*i))
+      chosen.push_back(*i);
+  }
+  if (bed_.clumps.possible) bed_.clump_spheres.keep_whole(chosen);
+  std::vector<int> of_clumps;
+  for (const int i : chosen) {
+    if (bed_.clumps.of(i)) of_clumps.push_back(i);
+    lock(i);
+    changes_.locked.push_back(bed_.atoms.tag[i]);
+    changes_.locked_anywhere[bed_.atoms.tag[i]] = 1;
   }
   if (bed_.clumps.possible) lock_clumps(of_clumps);
 }

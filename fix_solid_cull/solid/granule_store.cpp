@@ -87,13 +87,15 @@ auto GranuleStore::head_of_row(StoredGranule g) const -> Head {
     head[normal_load_word] = word_of({g.normal_load, g.load_change[0], g.load_change[1], g.load_change[2]});
   }
   int k = 0;
-  if (g.has_clump) g.each_of_clump([&](double& x) { head[clump_words + k++] = bits_of(x); });
-  k = 0;
   g.each_small([&](auto& x) {
     head[small_words + k / 2] |= static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32 * (k % 2);
     ++k;
   });
   return head;
+}
+
+void GranuleStore::append_clump(StoredGranule g, std::vector<std::uint64_t>& row) {
+  if (g.has_clump) g.each_of_clump([&](double& x) { row.push_back(bits_of(x)); });
 }
 
 // ------------------------------------------------------------------------------------------------------------------ in and out
@@ -118,6 +120,7 @@ void GranuleStore::add(const StoredGranule& granule, const double* record, int l
   row.resize(record_begin + static_cast<std::size_t>(length));
   std::copy(head.begin(), head.end(), row.begin());
   if (length) std::memcpy(row.data() + record_begin, record, static_cast<std::size_t>(length) * sizeof(double));
+  append_clump(granule, row);
   if (!transient.empty()) {
     auto& lists = transient_.indices;
     auto list = std::find(lists.begin(), lists.end(), transient);
@@ -195,8 +198,10 @@ StoredGranule GranuleStore::granule(int s) const {
     x = static_cast<std::decay_t<decltype(x)>>(static_cast<std::uint32_t>(row[small_words + k / 2] >> 32 * (k % 2)));
     ++k;
   });
-  k = clump_words;
-  if (g.has_clump) g.each_of_clump([&](double& x) { x = number_of(row[k++]); });
+  if (!g.has_clump) return g;
+  const std::vector<std::uint64_t> all = row_of(s);
+  auto word = all.end() - StoredGranule::clump_numbers;
+  g.each_of_clump([&](double& x) { x = number_of(*word++); });
   return g;
 }
 
@@ -210,7 +215,7 @@ std::vector<std::uint64_t> GranuleStore::row_of(int s) const {
 
 void GranuleStore::read_record(int s, std::vector<double>& out) const {
   const std::vector<std::uint64_t> row = row_of(s);
-  out.resize(row.size() - record_begin);
+  out.resize(row.size() - record_begin - words_of_clump(granule(s)));
   if (!out.empty()) std::memcpy(out.data(), row.data() + record_begin, out.size() * sizeof(double));
   if (const auto* known = transient_.of_tag.find(tag_at(s))) {
     std::size_t word = known->first;
@@ -221,9 +226,11 @@ void GranuleStore::read_record(int s, std::vector<double>& out) const {
 /// Keeps what has changed but for place and body.
 void GranuleStore::change(int s, const StoredGranule& before, const StoredGranule& after) {
   const auto head = head_of_row(after);
-  if (head == head_of_row(before)) return;
+  if (head == head_of_row(before) && !after.has_clump) return;
   std::vector<std::uint64_t> row = row_of(s);
   std::copy(head.begin() + 1, head.end(), row.begin() + 1);
+  row.resize(row.size() - words_of_clump(before));
+  append_clump(after, row);
   replace_row(s, row);
   mass_ -= before.mass;
   mass_ += after.mass;
@@ -249,6 +256,7 @@ void GranuleStore::set_record(std::int64_t tag, int layout, std::vector<double> 
   const auto head = head_of_row(g);
   std::copy(head.begin(), head.end(), row.begin());
   if (!record.empty()) std::memcpy(row.data() + record_begin, record.data(), record.size() * sizeof(double));
+  append_clump(g, row);
   replace_row(s, row);
 }
 

@@ -164,7 +164,8 @@ class GranuleStore {
     for (; from < all && most > 0; ++from) {
       if (tag_at(from) == free_mark) continue;
       const std::vector<std::uint64_t> row = row_of(from);
-      visit(granule(from), row.data() + record_begin, static_cast<int>(row.size() - record_begin));
+      const StoredGranule g = granule(from);
+      visit(g, row.data() + record_begin, static_cast<int>(row.size() - record_begin - words_of_clump(g)));
       --most;
     }
     return from;
@@ -207,8 +208,8 @@ class GranuleStore {
  private:
   static constexpr int none = -1;
   static constexpr std::int32_t free_mark = INT32_MIN;
-  /// A granule's row: its head, then its engine record; its tail stands behind. Tag, radius and mass come first, as key words;
-  /// small numbers stand in pairs.
+  /// A granule's row: its head, then its engine record, then the numbers of its clump, if it has one; its tail stands behind.
+  /// Tag, radius and mass come first, as key words; small numbers stand in pairs.
   enum Word {
     tag_word,
     radius_word,
@@ -216,11 +217,12 @@ class GranuleStore {
     step_word,
     normal_load_word,
     load_change_word,
-    clump_words = load_change_word + 3,
-    small_words = clump_words + StoredGranule::clump_numbers
+    small_words = load_change_word + 3
   };
   static constexpr int record_begin = small_words + (SmallNumbers::count() + 1) / 2;
   using Head = std::array<std::uint64_t, record_begin>;
+  static std::size_t words_of_clump(const StoredGranule& g) { return g.has_clump ? StoredGranule::clump_numbers : 0; }
+  static void append_clump(StoredGranule g, std::vector<std::uint64_t>& row);
   /// The words of a slot: 44, 36 or 28 bytes.
   enum Field {
     tag_field,

@@ -311,8 +311,8 @@ TEST_P(BlockOfClumps, KeepsItsMomenta) {
   EXPECT_LE((after.momentum - before.momentum).norm(), 1e-12 * before.motion);
   EXPECT_LE((after.turning - before.turning).norm(), 1e-12 * before.turning_motion);
   if (e.rank() == 0)
-    std::printf("%s: %g of %g interior; momentum %.2g, angular momentum %.2g of what moves\n", bed.name.c_str(), interior, spheres,
-                (after.momentum - before.momentum).norm() / before.motion,
+    std::printf("%s: %g of %g interior; momentum %.2g, angular momentum %.2g of what moves\n", bed.name.c_str(), interior,
+                spheres, (after.momentum - before.momentum).norm() / before.motion,
                 (after.turning - before.turning).norm() / before.turning_motion);
 }
 
@@ -343,7 +343,8 @@ TEST(ClumpsInDecks, GoOnFromARestartFile) {
   EXPECT_LE(largest_difference(on.clumps(), again.clumps()), 1e-9);
 }
 
-/// All clumps are stored as a run begins, and new ones are poured on them: no number is given twice, and as many come as in stock.
+/// All clumps are stored as a run begins, and new ones are poured on them: no number is given twice, and as many come as in
+/// stock.
 TEST(ClumpsInDecks, AreInsertedOnWhatIsStored) {
   const ClumpBed bed = bed_of("three");
   const std::string pour = bed.templates + "fix dist all particledistribution/discrete 32452867 " + bed.shares +
@@ -372,7 +373,8 @@ TEST(ClumpsInDecks, AreInsertedOnWhatIsStored) {
 /// A clump that has lost a sphere is deleted, stored or not, as in stock.
 TEST(ClumpsInDecks, AreDeletedAsInStock) {
   const ClumpBed bed = bed_of("three");
-  const std::string dig = "region hole block 0.008 0.016 0.008 0.016 0 0.008 units box\ndelete_atoms region hole compress no\nrun 300\n";
+  const std::string dig =
+      "region hole block 0.008 0.016 0.008 0.016 0 0.008 units box\ndelete_atoms region hole compress no\nrun 300\n";
   Engine stock, culled;
   stock.run(read(bed) + "run 600\n" + dig);
   culled.run(read(bed) + asleep + "run 600\n");
