@@ -139,11 +139,13 @@ class Clumps {
  public:
   virtual ~Clumps() = default;
 
-  bool possible = false;         ///< there may be some in this deck; all ranks say the same
-  const int* of_atom = nullptr;  ///< number of the clump that an atom, owned or ghost, is a sphere of; below 1: of none
-  int rest_size = 0;             ///< of Clump::rest
+  bool possible = false;  ///< there may be some in this deck; all ranks say the same
+  /// Where the engine says which array has the number of the clump that an atom, owned or ghost, is a sphere of; below 1: of
+  /// none.
+  int* const* of_atom = nullptr;
+  int rest_size = 0;  ///< of Clump::rest
 
-  int of(int i) const { return possible ? std::max(of_atom[i], 0) : 0; }
+  int of(int i) const { return possible ? std::max((*of_atom)[i], 0) : 0; }
   /// The clumps that this rank moves: how many, and one of them; the one with this number, if it is here.
   virtual int count() const = 0;
   virtual Clump clump(int k) const = 0;

@@ -27,11 +27,9 @@ void EngineClumps::connect() {
   fix_ = nullptr;
   for (int f = 0; f < modify->nfix && !fix_; ++f) fix_ = dynamic_cast<LAMMPS_NS::FixMultisphere*>(modify->fix[f]);
   possible = fix_ != nullptr;
+  of_atom = possible ? &engine::clumps_of_atoms(*fix_) : nullptr;
   if (possible) find_columns();
-  renew();
 }
-
-void EngineClumps::renew() { of_atom = possible ? engine::clumps_of_atoms(*fix_) : nullptr; }
 
 /// Columns follow each other in the order in which they were made; some do not go to other ranks, and are not packed.
 void EngineClumps::find_columns() {

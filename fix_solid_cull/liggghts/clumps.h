@@ -19,8 +19,6 @@ class EngineClumps : public Clumps, protected LAMMPS_NS::Pointers {
 
   /// A run begins, or the fix is made: fixes may be others. Local.
   void connect();
-  /// The engine's arrays may be others: reads them anew. At each hook. Local.
-  void renew();
 
   int count() const override;
   Clump clump(int k) const override;

@@ -232,7 +232,7 @@ void set_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_
 int& clumps_here(LAMMPS_NS::Multisphere& clumps) { return clumps.*member(ClumpsHere()); }
 int*& rows_of_clumps(LAMMPS_NS::Multisphere& clumps) { return clumps.*member(RowsOfClumps()); }
 int& highest_clump(LAMMPS_NS::Multisphere& clumps) { return clumps.*member(HighestClump()); }
-int* clumps_of_atoms(LAMMPS_NS::FixMultisphere& fix) { return fix.*member(ClumpsOfAtoms()); }
+int* const& clumps_of_atoms(const LAMMPS_NS::FixMultisphere& fix) { return fix.*member(ClumpsOfAtoms()); }
 double* const* displacements(const LAMMPS_NS::FixMultisphere& fix) { return fix.*member(Displacements()); }
 
 void* found_symbol(const char* name) { return dlsym(RTLD_NEXT, name); }

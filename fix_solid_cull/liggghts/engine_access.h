@@ -102,7 +102,7 @@ std::vector<const LAMMPS_NS::Region*> parts_of(const LAMMPS_NS::Region* region, 
 int& clumps_here(LAMMPS_NS::Multisphere& clumps);
 int*& rows_of_clumps(LAMMPS_NS::Multisphere& clumps);  ///< by number
 int& highest_clump(LAMMPS_NS::Multisphere& clumps);
-int* clumps_of_atoms(LAMMPS_NS::FixMultisphere& fix);
+int* const& clumps_of_atoms(const LAMMPS_NS::FixMultisphere& fix);
 double* const* displacements(const LAMMPS_NS::FixMultisphere& fix);  ///< of atoms from the centres of their clumps, along axes
 /// The fix does its work before the exchange of atoms when all others have done theirs. Until lists of fixes are made anew.
 void act_last_before_exchange(LAMMPS_NS::Modify& modify, const LAMMPS_NS::Fix* fix);

@@ -109,7 +109,6 @@ void FixSolidCull::fail(const std::string& why) {
 
 void FixSolidCull::renew() {
   atoms_.renew();
-  clumps_.renew();
   contacts_.renew();
   run_.renew();
 }

@@ -36,7 +36,6 @@ REFUSAL = re.compile(r"^ERROR: (fix cull solid/cull: .*)$", re.M)
 REASONS = {
     "heatTransfer_1/": "heat conduction", "heatTransfer_2/": "heat conduction",
     "hydrogel_multicontact/in.hydrogel_multicontact": "multicontact",
-    "multisphere_stone_restitution/": "multisphere",
     "superquadric/": "only spheres",
     "sph_1/": "SPH|sph", "sph_2/": "SPH|sph", "sphPoiseuille": "SPH|sph",
 }
@@ -133,8 +132,8 @@ class Outcome:
         return str(self.granules) if self.well() else "failed"
 
 
-def fault(name, stock, run):
-    """What is wrong with a run that had the line, or None."""
+def fault(name, stock, alone, run):
+    """What is wrong with a run that had the line, or None. stock: runs without it; alone: that on the same ranks."""
     if run.late:
         return "did not end"
     reason = reason_of(name)
@@ -143,6 +142,8 @@ def fault(name, stock, run):
             return "is refused, but not in one line"
         said = re.sub(r" \(\S+:\d+\)$", "", run.refusals[0])
         return None if reason and re.search(reason, said) else f"is refused for another reason: {said}"
+    if not run.well() and not alone.well() and run.why() == alone.why():
+        return None  # so does stock
     if not run.well():
         return f"ended badly: {run.failed or 'before its last line'}"
     if reason:
@@ -171,7 +172,7 @@ def judge(name, source, ranks, exteriors, steps, launcher, stock):
         for n in ranks:
             run = Outcome(with_line(lines, exterior), source, OUT / f"{slug}.{exterior}.{n}.log", launcher, n)
             row[exterior][n], row["seconds"][exterior][n] = f"{run.figure()} ({run.culled} culled)" if run.well() else run.figure(), round(run.seconds, 1)
-            wrong = fault(name, whole, run)
+            wrong = fault(name, whole, runs[n], run)
             if wrong:
                 row["faults"].append(f"{exterior} on {n} rank{'s' * (n > 1)} {wrong}")
             if run.refusals:
