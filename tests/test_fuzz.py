@@ -52,6 +52,7 @@ fix integrate all nve/sphere
 compute ke all ke
 compute lib_mass all property/atom mass
 run 100""".splitlines()
+CLUMP_SEEDS = (142, 113, 131, 144, 149)  # with clumps; the first lost some when a restart file was written between two builds
 WENT_WRONG = (5009, 5060, 40007, 70066, 80191)  # once, on one to four ranks
 
 
@@ -99,6 +100,14 @@ class RandomDecks(unittest.TestCase):
                             self.assertEqual(verdict.kind, "good", f"{verdict.text}\ntests/fuzz/fuzz.py --seed {seed} --count 1 --ranks "
                                              f"{','.join(map(str, RANKS))} --library {'all' if library else 'none'} --shrink")
 
+
+    def test_decks_with_clumps(self):
+        with tempfile.TemporaryDirectory(prefix="solidcull-fuzz-") as folder:
+            for seed in CLUMP_SEEDS:
+                with self.subTest(seed=seed):
+                    verdict = fuzz.verdict_of(grammar.make(seed, ranks=[1, 2], library=False, clumps=True), Path(folder) / str(seed))
+                    self.assertEqual(verdict.kind, "good", f"{verdict.text}\ntests/fuzz/fuzz.py --clumps --library none --ranks 1,2 "
+                                     f"--seed {seed} --count 1 --shrink")
 
     def test_decks_on_several_ranks(self):
         with tempfile.TemporaryDirectory(prefix="solidcull-fuzz-") as folder:

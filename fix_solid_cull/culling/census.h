@@ -28,9 +28,10 @@ class Census {
   }
   /// The engine learns how many atoms there are, see Atoms::publish_counts(). Collective.
   void publish_atoms(std::int64_t returned) {
-    std::int64_t all[2] = {bed_.atoms.owned, bed_.atoms.map_is_too_small()};
-    bed_.ranks.sum(all, 2);
+    std::int64_t all[3] = {bed_.atoms.owned, bed_.atoms.map_is_too_small(), bed_.clumps.count()};
+    bed_.ranks.sum(all, 3);
     bed_.atoms.publish_counts(returned, all[0], all[1] != 0);
+    if (bed_.clumps.possible) bed_.clumps.publish_count(all[2]);
   }
   /// Collective.
   void count_bodies() {

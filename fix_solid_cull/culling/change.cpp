@@ -83,7 +83,7 @@ auto Change::begin(const Look& look) -> Occasion {
 }
 
 auto Change::see(bool shell_changed, const MembershipChange& c) -> Outcome {
-  enum { changed, leave, sorts, map, bodies, locked, stored, atoms, numbers };
+  enum { changed, leave, sorts, map, bodies, locked, stored, atoms, clumps, numbers };
   std::int64_t all[numbers] = {};
   all[changed] = shell_changed;
   all[leave] = p_.handover.find_leaving(p_.deep.take_away_from_home());
@@ -93,7 +93,9 @@ auto Change::see(bool shell_changed, const MembershipChange& c) -> Outcome {
   all[locked] = static_cast<std::int64_t>(bed_.solid.locked());
   all[stored] = static_cast<std::int64_t>(bed_.solid.store().size());
   all[atoms] = bed_.atoms.owned;
+  all[clumps] = bed_.clumps.count();
   bed_.ranks.sum(all, numbers);
+  if (bed_.clumps.possible) bed_.clumps.publish_count(all[clumps]);
   return {all[changed] != 0, all[leave] != 0, all[sorts] != 0, all[map] != 0, all[bodies], all[locked], all[stored], all[atoms]};
 }
 

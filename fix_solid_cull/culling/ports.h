@@ -155,6 +155,8 @@ class Clumps {
   virtual void know_largest(double apart) = 0;
   /// No clump that is made from here on gets a number up to the highest that there was, or that was told.
   virtual int highest_number() const = 0;
+  /// So many are moved, over all ranks. All ranks say so alike.
+  virtual void publish_count(std::int64_t all) = 0;
   virtual void keep_number(int number) = 0;
   // --- only while membership changes
   /// The engine moves it no more, and knows it no more. Which of them comes under another number may change.

@@ -69,6 +69,9 @@ double EngineClumps::largest() const {
 
 int EngineClumps::highest_number() const { return possible ? engine::highest_clump(all()) : 0; }
 
+/// The engine counts them itself at the next neighbour build; a restart file may be written before.
+void EngineClumps::publish_count(std::int64_t everywhere) { engine::clumps_everywhere(all()) = static_cast<int>(everywhere); }
+
 Clump EngineClumps::clump(int k) const {
   Clump c;
   c.rest.resize(static_cast<std::size_t>(rest_size));

@@ -88,6 +88,7 @@ SOLIDCULL_EXPOSE(SortPermutation, Atom, int*, permute)
 SOLIDCULL_EXPOSE(SortMostAtoms, Atom, int, maxnext)
 SOLIDCULL_EXPOSE(SameTagAtoms, Atom, int, smax)
 SOLIDCULL_EXPOSE(ClumpsHere, Multisphere, int, nbody_)
+SOLIDCULL_EXPOSE(ClumpsEverywhere, Multisphere, int, nbody_all_)
 SOLIDCULL_EXPOSE(RowsOfClumps, Multisphere, int*, mapArray_)
 SOLIDCULL_EXPOSE(HighestClump, Multisphere, int, mapTagMax_)
 SOLIDCULL_EXPOSE(ClumpsOfAtoms, FixMultisphere, int*, body_)
@@ -230,6 +231,7 @@ void set_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_
 }
 
 int& clumps_here(LAMMPS_NS::Multisphere& clumps) { return clumps.*member(ClumpsHere()); }
+int& clumps_everywhere(LAMMPS_NS::Multisphere& clumps) { return clumps.*member(ClumpsEverywhere()); }
 int*& rows_of_clumps(LAMMPS_NS::Multisphere& clumps) { return clumps.*member(RowsOfClumps()); }
 int& highest_clump(LAMMPS_NS::Multisphere& clumps) { return clumps.*member(HighestClump()); }
 int* const& clumps_of_atoms(const LAMMPS_NS::FixMultisphere& fix) { return fix.*member(ClumpsOfAtoms()); }

@@ -100,6 +100,7 @@ Stream stream_of(const LAMMPS_NS::FixInsertStream& fix);
 std::vector<const LAMMPS_NS::Region*> parts_of(const LAMMPS_NS::Region* region, const LAMMPS_NS::Domain& domain);
 // --- clumps: the table of rows that this rank moves
 int& clumps_here(LAMMPS_NS::Multisphere& clumps);
+int& clumps_everywhere(LAMMPS_NS::Multisphere& clumps);
 int*& rows_of_clumps(LAMMPS_NS::Multisphere& clumps);  ///< by number
 int& highest_clump(LAMMPS_NS::Multisphere& clumps);
 int* const& clumps_of_atoms(const LAMMPS_NS::FixMultisphere& fix);

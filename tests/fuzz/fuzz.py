@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Random small decks, each run by stock LIGGGHTS and with solid/cull.
 
-    tests/fuzz/fuzz.py --seed S --count N [--ranks 1,2,4,8] [--between none|harmless|all] [--library some|all|none] [--keep DIR] [--shrink]
+    tests/fuzz/fuzz.py --seed S --count N [--ranks 1,2,4,8] [--between none|harmless|all] [--library some|all|none] [--clumps] [--keep DIR] [--shrink]
 
 Deck k has the seed S + k. A deck that comes out wrong is printed in one line with its seed, and kept in DIR with its logs
 (default: build/fuzz). `--shrink` looks for the smallest deck that fails the same way, and prints it. `--print` prints decks and runs
@@ -84,6 +84,7 @@ def main(argv=None):
     p.add_argument("--between", choices=grammar.BETWEEN, default="all", help="commands between runs")
     p.add_argument("--plain", action="store_true", help="without streams, sums over contacts, other contact models and loops of short runs")
     p.add_argument("--library", choices=("some", "all", "none"), default="some", help="decks that go by the C library (default: one of five)")
+    p.add_argument("--clumps", action="store_true", help="granules of several spheres in each deck")
     p.add_argument("--stock", action="store_true", help="stock in place of the culled run: what fails then is the fuzzer's own fault")
     p.add_argument("--keep", type=Path, default=ROOT / "build" / "fuzz", metavar="DIR", help="where decks that fail are left")
     p.add_argument("--keep-all", action="store_true", help="those that are right too")
@@ -93,7 +94,8 @@ def main(argv=None):
     ranks = [int(n) for n in options.ranks.split(",")] if options.ranks else None
     kinds, slept, began = collections.Counter(), 0, time.monotonic()
     for seed in range(options.seed, options.seed + options.count):
-        deck = grammar.make(seed, options.between, ranks, not options.plain, {"some": None, "all": True, "none": False}[options.library])
+        deck = grammar.make(seed, options.between, ranks, not options.plain, {"some": None, "all": True, "none": False}[options.library],
+                            options.clumps)
         if options.show:
             show(deck)
             continue

@@ -35,10 +35,10 @@ class Grammar(MoreEvents):
     """Makes one deck. `more`: with the events of more.py; `library`: whether it goes by the C library, None for one deck of five. Traits: `loose` once chance may change how many granules there are, `leaves` where granules may leave,
     `driven` where the end is not at rest."""
 
-    def __init__(self, seed, between="all", ranks=None, more=True, library=None):
+    def __init__(self, seed, between="all", ranks=None, more=True, library=None, clumps=False):
         self.rng = random.Random(f"solidcull {seed}")
         self.rng_of_balance = random.Random(f"balance {seed}")  # its own, so that a deck is otherwise the same without it
-        self.seed, self.between, self.ranks = seed, between, ranks
+        self.seed, self.between, self.ranks, self.clumps = seed, between, ranks, clumps
         self.more = more and between == "all"
         self.library = self.more and (self.chance(0.2) if library is None else library)
         self.streaming = self.pair_changed = False
@@ -71,6 +71,8 @@ class Grammar(MoreEvents):
         self.ranks_of = [self.pick_ranks()]
         self.slow = self.ranks_of[0][0] > 1  # where ranks share processors, each step waits for each rank
         self.how = rng.choice(("lattice",) * 4 + ("pack",) if self.slow else ("lattice", "lattice", "pack", "pack", "rate"))
+        if self.clumps:
+            self.how = rng.choice(("pack", "pack", "rate"))  # clumps come by insertion alone
         shut = rng.choice("ffmms" if self.how == "lattice" else "ffmm")  # LIGGGHTS wraps no box without granules
         self.boundary = ["p" if p else shut for p in self.periodic] + [rng.choice("ffm") if shut == "f" else shut]
         self.skin = rng.choice((0.0003, 0.0004, 0.0006, 0.001))
@@ -172,8 +174,9 @@ class Grammar(MoreEvents):
     def bed(self):
         rng = self.rng
         self.say("fix integrate all nve/sphere" if self.chance(0.9) else "fix integrate all nve/limit radius_ratio 0.5", needed=True)
+        self.move_clumps()
         self.say("compute ke all ke", f"thermo {rng.choice((100, 500, 1000))}", "thermo_style custom step atoms ke c_ke",
-                 f"thermo_modify lost {'error' if self.chance(0.8) else 'ignore'} norm no")
+                 f"thermo_modify lost {'error' if self.chance(0.8) and not self.clumps else 'ignore'} norm no")  # stock deletes broken clumps
         how = self.how
         early = self.chance(0.3)
         if early:
@@ -212,13 +215,32 @@ class Grammar(MoreEvents):
         if self.chance(0.2):
             self.say(f"displace_atoms all random {0.02 * D:g} {0.02 * D:g} 0 {rng.choice(SEEDS)} units box")
 
+    def move_clumps(self):
+        if self.clumps:
+            self.say("fix clumps all multisphere allow_group_and_set yes", needed=True)
+
     def templates(self):
         sizes = self.sizes()
+        if self.clumps:
+            self.clump_templates()
+            return
         for k, size in enumerate(sizes):
             self.say(f"fix t{k} all particletemplate/sphere {(15485863, 15485867)[k]} atom_type {k + 1} density constant {DENSITY} "
                      f"radius constant {size / 2:g}", needed=True)
         shares = " ".join(f"t{k} {1 / len(sizes)}" for k in range(len(sizes)))
         self.say(f"fix dist all particledistribution/discrete 32452843 {len(sizes)} {shares}", needed=True)
+
+    def clump_templates(self):
+        """Of three spheres and of five in a row, some with single spheres among them."""
+        spheres = {"t0": "3 ntry 100000 spheres 0 0 0 0.0008 0.0009 0 0 0.0007 0.0004 0.0008 0 0.0006",
+                   "t1": "5 ntry 100000 spheres " + " ".join(f"{0.0006 * k:g} 0 0 0.0007" for k in range(-2, 3))}
+        kinds = self.rng.choice((["t0"], ["t0"], ["t0", "t1"], ["t0", "t2"], ["t0", "t1", "t2"]))
+        for k, t in enumerate(kinds):
+            head = f"fix {t} all particletemplate/{{}} {SEEDS[k]} atom_type {1 + k % 2} density constant {DENSITY} "
+            self.say(head.format("multisphere") + f"nspheres {spheres[t]} type {k + 1}" if t in spheres else
+                     head.format("sphere") + f"radius constant {D / 3:g}", needed=True)
+        shares = " ".join(f"{t} {1 / len(kinds)}" for t in kinds)
+        self.say(f"fix dist all particledistribution/discrete 49979693 {len(kinds)} {shares}", needed=True)
 
     def insertion(self, how):
         rng = self.rng
@@ -227,6 +249,8 @@ class Grammar(MoreEvents):
         self.say(f"region pour block 0 {self.box:.4f} 0 {self.box:.4f} 0.002 {self.top - 0.002:.4f} units box", needed=True)
         common = "distributiontemplate dist maxattempt 200"
         words = "overlapcheck yes all_in yes vel constant 0 0 -1 region pour"
+        if self.clumps:
+            words = words.replace("region", "orientation random region") + " ntry_mc 10000"
         if how == "pack":
             self.say(f"fix ins all insert/pack seed 32452867 {common} insert_every once {words} particles_in_region {n}", needed=True)
         else:
@@ -522,9 +546,10 @@ class Grammar(MoreEvents):
         self.head("stop.restart")
         self.physics(again=True)
         self.say("fix integrate all nve/sphere", needed=True)
+        self.move_clumps()
         if self.more:
             self.say("compute ke all ke", needed=True)
-        self.say("thermo_modify lost error norm no")
+        self.say(f"thermo_modify lost {'ignore' if self.clumps else 'error'} norm no")
         if self.culling:
             self.cull()
         self.second_file = False
@@ -568,9 +593,9 @@ def meshes(deck_box, room, height, layers):
             "blade.stl": stl(grid((0.5 * b, 0.2 * b, height - 2 * D), (0, 0.6 * b, 0), (0, 0, 2 * D), 2))}
 
 
-def make(seed, between="all", ranks=None, more=True, library=None):
+def make(seed, between="all", ranks=None, more=True, library=None, clumps=False):
     """The deck of a seed, and the meshes that it needs."""
-    g = Grammar(seed, between, ranks, more, library)
+    g = Grammar(seed, between, ranks, more, library, clumps)
     deck = g.deck()
     deck.meshes = meshes(g.box, g.room, g.tool_height(), g.layers)
     return deck

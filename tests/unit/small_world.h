@@ -167,6 +167,7 @@ class SmallClumps : public Clumps {
   void know_largest(double) override {}
   int highest_number() const override { return 0; }
   void keep_number(int) override {}
+  void publish_count(std::int64_t) override {}
   Clump take(int) override { return {}; }
   void put(const Clump&, int) override {}
   void set_clump(int, int) override {}

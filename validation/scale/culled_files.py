@@ -15,9 +15,9 @@ BEGINS, ENDS = b"SDCULLB1", b"SDCULLE1"
 END = 72                                                 # bytes of a section's end
 PART, INTERFACE, INTERIOR = 1, 2, 3                      # kinds of chunks
 ONE, MOST, FEW, LIKE, NARROW, PLAIN = range(6)           # ways to keep a column
-MARK = 20261203.0                                        # of the fix's numbers
+MARK = 20261210.0                                        # of the fix's numbers
 (STATE_MARK, STATE_SIZE, STATE_INTERIOR, STATE_DIAMETER) = range(1, 5)
-STATE_COUNTERS, STATE_WIDTH, STATE_RANKS, STATE_STEP, STATE_NO_PLACES, STATE_SECTION, STATE_IDENTITY, STATE_TYPES = 9, 15, 16, 17, 18, 19, 20, 22
+STATE_COUNTERS, STATE_WIDTH, STATE_RANKS, STATE_STEP, STATE_NO_PLACES, STATE_SECTION, STATE_IDENTITY, STATE_TYPES = 9, 15, 16, 17, 18, 19, 23, 25
 HIGH, LOW = 0xffffffff00000000, 0xffffffff
 WORDS = np.dtype("<u8")
 

@@ -29,11 +29,11 @@ from solidcull_runs import errors  # noqa: E402
 
 WORDS, NUMBERS = files.WORDS, np.dtype("<f8")
 # columns of granules, in the order of StoredGranule::each_number(), and of contacts: see store_section.h
-TAG, BODY, PLACE, RADIUS, MASS, CHANGE, LAYOUT, HELD, RECORD = 0, 1, 2, 5, 6, 9, 13, 15, 16
+TAG, BODY, PLACE, RADIUS, MASS, CHANGE, LAYOUT, CLUMP, HELD, RECORD = 0, 1, 2, 5, 6, 9, 23, 25, 27, 29
 LOW, HIGH, C_BODY, KNOWN, HISTORY = range(5)
 VECTOR_WIDTH = 3
 # numbers of a body, in the order of SolidBody::each_number()
-ORIGIN, QUATERNION, COUNT, B_HELD, ABOUT, B_MASS, FIRST, SECOND, SPIN, TWIST = 0, 3, 7, 8, 9, 12, 13, 16, 25, 26
+ORIGIN, QUATERNION, COUNT, WEIGHING, B_HELD, ABOUT, B_MASS, FIRST, SECOND, SPIN, TWIST = 0, 3, 7, 8, 9, 10, 13, 14, 17, 26, 27
 FROM_END = 24
 CHANGED, SPANNED, SUMMED, FELT, FELT_KNOWN, STEP_THEN, GROUNDED, GROUNDED_MASS = 0, 1, 5, 6, 9, 13, 17, 18
 MAIN = 0                                            # the body that holds nearly all, in what is written
@@ -181,6 +181,8 @@ class Source:
             self.interface[t].append(table[:, tile == t])
 
     def split_interior(self, table):
+        if table[CLUMP].any():
+            raise files.CulledFileError("the restart file holds clumps: lay a bed of spheres")
         tile = self.to_world(table, PLACE)
         # what is on a mesh is on that element there: a granule on two at once is on the one below it
         for layout in np.unique(table[LAYOUT]):
@@ -272,7 +274,7 @@ class Bodies:
             was, turn = source.bodies[like], source.turns[like]
             about, count, mass, first, second, spin, held = sums
             row[QUATERNION + 3] = 1
-            row[COUNT], row[B_HELD], row[B_MASS], row[SPIN] = count, held, mass, spin
+            row[COUNT], row[WEIGHING], row[B_HELD], row[B_MASS], row[SPIN] = count, count, held, mass, spin
             row[ABOUT:ABOUT + 3], row[FIRST:FIRST + 3] = about, first
             row[SECOND:SECOND + 9] = second.T.reshape(-1)
             row[tail + CHANGED], row[tail + SUMMED] = 1, count
