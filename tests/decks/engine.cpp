@@ -196,6 +196,20 @@ void expect_all_there(Engine& e, const std::string& cull, std::size_t granules) 
   EXPECT_EQ(e.vector(cull, 3), static_cast<double>(granules - atoms.size())) << "interior granules";
 }
 
+void expect_same_histories(const Histories& a, const Histories& b) {
+  EXPECT_EQ(a.size(), b.size());
+  double most = 0, scale = 0;
+  for (const auto& h : a) {
+    const auto other = b.find(h.first);
+    ASSERT_NE(other, b.end()) << "the history of " << h.first.first << " with " << h.first.second << " was lost";
+    for (std::size_t d = 0; d < h.second.size(); ++d) {
+      most = std::max(most, std::abs(h.second[d] - other->second[d]));
+      scale = std::max(scale, std::abs(h.second[d]));
+    }
+  }
+  EXPECT_LE(most, 1e-12 * scale);
+}
+
 double largest_difference(const State& a, const State& b, Vec Granule::*what) {
   double most = 0;
   for (const auto& g : a) {

@@ -60,6 +60,9 @@ class Engine {
 };
 
 double largest_difference(const State& a, const State& b, Vec Granule::*what);
+
+/// The same pairs, and every value within 1e-12 of the largest; local.
+void expect_same_histories(const Histories& a, const Histories& b);
 /// Expects the same tags, each with its type, radius and mass to the bit.
 void expect_same_granules(const State& a, const State& b);
 double largest(const State& a, Vec Granule::*what);
