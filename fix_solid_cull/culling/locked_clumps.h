@@ -60,14 +60,14 @@ class LockedClumps : public FollowsAtoms {
     if (!known) return;
     Clump c = *known;
     if (shell_[i].in_body()) c.lies = c.lies.in_world(bodies_.pose(shell_[i].body));
+    c.rest.resize(std::min(c.rest.size(), static_cast<std::size_t>(clumps_.rest_size)));
     std::vector<double> numbers;
     solidcull::pack(c, numbers);
-    to[0] = 1;
-    std::copy_n(numbers.begin(), std::min<std::size_t>(numbers.size(), static_cast<std::size_t>(size) - 1), to + 1);
+    to[0] = static_cast<double>(1 + c.rest.size());  // columns may have come since it was locked
+    std::copy(numbers.begin(), numbers.end(), to + 1);
   }
   void unpack(int i, const double* from) override {
-    if (packed_size() > 0 && from[0] != 0)
-      put(atoms_.tag[i], unpack_clump(from + 1, static_cast<std::size_t>(clumps_.rest_size)));
+    if (packed_size() > 0 && from[0] != 0) put(atoms_.tag[i], unpack_clump(from + 1, static_cast<std::size_t>(from[0]) - 1));
   }
 
  private:

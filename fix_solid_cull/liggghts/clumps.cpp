@@ -31,9 +31,20 @@ void EngineClumps::connect() {
   if (possible) find_columns();
 }
 
-/// Columns follow each other in the order in which they were made; some do not go to other ranks, and are not packed.
+/// Calls visit(column, its place in a packed row, its numbers). They follow each other in the order in which they were made; some
+/// do not go to other ranks, and are not packed.
+template <class Visit>
+void EngineClumps::for_each_column(Visit visit) const {
+  int place = 0;
+  for (int c = 0; LAMMPS_NS::ContainerBase* column = all().prop().getElementPropertyBase(c); ++c) {
+    const int size = column->elemBufSize(LAMMPS_NS::OPERATION_COMM_EXCHANGE, dummy, dummy, dummy);
+    if (size == 0) continue;
+    visit(*column, place, size);
+    place += size;
+  }
+}
+
 void EngineClumps::find_columns() {
-  LAMMPS_NS::CustomValueTracker& columns = all().prop();
   const struct {
     const char* name;
     int* place;
@@ -42,16 +53,14 @@ void EngineClumps::find_columns() {
                 {"masstotal", &at_.mass},          {"inertia", &at_.inertia},  {"ex_space", &at_.axes[0]},
                 {"ey_space", &at_.axes[1]},        {"ez_space", &at_.axes[2]}, {"nrigid", &at_.spheres}};
   for (const auto& w : wanted) *w.place = -1;
-  int at = 0;
-  for (int c = 0; LAMMPS_NS::ContainerBase* column = columns.getElementPropertyBase(c); ++c) {
-    const int size = column->elemBufSize(LAMMPS_NS::OPERATION_COMM_EXCHANGE, dummy, dummy, dummy);
+  rest_size = 0;
+  for_each_column([&](LAMMPS_NS::ContainerBase& column, int place, int size) {
     for (const auto& w : wanted)
-      if (std::strcmp(column->id(), w.name) == 0 && size > 0) *w.place = at;
-    at += size;
-  }
+      if (std::strcmp(column.id(), w.name) == 0) *w.place = place;
+    rest_size = place + size;
+  });
   for (const auto& w : wanted)
     if (*w.place < 0) throw InternalError(std::string("clumps of this LIGGGHTS have no column ") + w.name);
-  rest_size = at;
 }
 
 int EngineClumps::count() const { return possible ? all().n_body() : 0; }
@@ -90,6 +99,7 @@ Clump EngineClumps::clump(int k) const {
   for (const int of_three : {at_.centre, at_.velocity, at_.angular_momentum, at_.spin, at_.axes[0], at_.axes[1], at_.axes[2]})
     std::fill_n(row + of_three, 3, 0.0);
   std::fill_n(row + at_.quaternion, 4, 0.0);
+  row[at_.number] = 0;
   return c;
 }
 
@@ -103,11 +113,14 @@ Clump EngineClumps::take(int number) {
   return c;
 }
 
-/// Its centre is where its spheres say, in the periodic image that their image flags name.
+/// Its centre is where its spheres say, in the periodic image that their image flags name. A fix that came while it was culled
+/// may have given clumps a column more.
 void EngineClumps::put(const Clump& c, int sphere) {
   keep_number(c.number);
   numbers_ = c.rest;
+  numbers_.resize(static_cast<std::size_t>(rest_size));
   double* const row = numbers_.data();
+  row[at_.number] = c.number;
   double q[4] = {c.lies.turn.w(), c.lies.turn.x(), c.lies.turn.y(), c.lies.turn.z()};
   std::copy_n(q, 4, row + at_.quaternion);
   double axes[3][3];
@@ -132,7 +145,11 @@ void EngineClumps::put(const Clump& c, int sphere) {
   MathExtra::angmom_to_omega(turning, axes[0], axes[1], axes[2], inertia, row + at_.spin);
   LAMMPS_NS::Multisphere& clumps = all();
   clumps.prop().popElemFromBuffer(row, LAMMPS_NS::OPERATION_COMM_EXCHANGE, dummy, dummy, dummy);
-  engine::rows_of_clumps(clumps)[c.number] = engine::clumps_here(clumps)++;
+  const int here = engine::clumps_here(clumps)++;
+  engine::rows_of_clumps(clumps)[c.number] = here;
+  for_each_column([&](LAMMPS_NS::ContainerBase& column, int place, int) {
+    if (place >= static_cast<int>(c.rest.size())) column.setToDefault(here);
+  });
 }
 
 void EngineClumps::set_clump(int i, int number) { engine::clumps_of_atoms(*fix_)[i] = number > 0 ? number : no_clump; }

@@ -39,6 +39,8 @@ class EngineClumps : public Clumps, protected LAMMPS_NS::Pointers {
     int centre = 0, velocity = 0, angular_momentum = 0, spin = 0, quaternion = 0, axes[3] = {}, inertia = 0, mass = 0,
         spheres = 0, number = 0;
   };
+  template <class Visit>
+  void for_each_column(Visit visit) const;
   void find_columns();
   LAMMPS_NS::Multisphere& all() const;
 

@@ -74,8 +74,25 @@ StoredGranule GranuleStore::rounded(StoredGranule granule) const {
   return granule;
 }
 
+/// Engines number the clumps of a kind in the order of their spheres' tags: what a tag is beyond that is the same for many, and
+/// costs nothing in a row. Where that would be too large, the number itself; told by the sign.
+void GranuleStore::number_by_tag(StoredGranule& g) {
+  const std::int64_t before = std::int64_t{g.spheres} * g.clump;
+  if (before <= INT32_MAX)
+    g.clump = static_cast<int>(g.tag - before);
+  else
+    g.spheres = -g.spheres;
+}
+void GranuleStore::number_by_clump(StoredGranule& g) {
+  if (g.spheres > 0)
+    g.clump = static_cast<int>((g.tag - g.clump) / g.spheres);
+  else
+    g.spheres = -g.spheres;
+}
+
 auto GranuleStore::head_of_row(StoredGranule g) const -> Head {
   Head head{};
+  if (g.spheres) number_by_tag(g);
   head[tag_word] = word_of_tag(g.tag);
   head[radius_word] = bits_of(g.radius);
   head[mass_word] = bits_of(g.mass);
@@ -198,6 +215,7 @@ StoredGranule GranuleStore::granule(int s) const {
     x = static_cast<std::decay_t<decltype(x)>>(static_cast<std::uint32_t>(row[small_words + k / 2] >> 32 * (k % 2)));
     ++k;
   });
+  if (g.spheres) number_by_clump(g);
   if (!g.has_clump) return g;
   const std::vector<std::uint64_t> all = row_of(s);
   auto word = all.end() - StoredGranule::clump_numbers;

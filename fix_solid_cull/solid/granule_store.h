@@ -223,6 +223,8 @@ class GranuleStore {
   using Head = std::array<std::uint64_t, record_begin>;
   static std::size_t words_of_clump(const StoredGranule& g) { return g.has_clump ? StoredGranule::clump_numbers : 0; }
   static void append_clump(StoredGranule g, std::vector<std::uint64_t>& row);
+  static void number_by_tag(StoredGranule& g);
+  static void number_by_clump(StoredGranule& g);
   /// The words of a slot: 44, 36 or 28 bytes.
   enum Field {
     tag_field,

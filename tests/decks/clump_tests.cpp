@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <set>
 #include <sstream>
@@ -357,6 +358,37 @@ TEST(ClumpsInDecks, AreInsertedOnWhatIsStored) {
   std::map<int, int> spheres;
   for (const auto& [tag, a] : back) ++spheres[a.clump];
   for (const auto& [number, n] : spheres) EXPECT_EQ(n, 3) << "spheres of clump " << number;
+}
+
+/// A fix that counts clumps gives each a number more. Those that were stored then have the number that it begins with.
+TEST(ClumpsInDecks, GetTheColumnsOfFixesThatComeLater) {
+  const ClumpBed bed = bed_of("three");
+  Engine without, with;
+  if (with.rank() == 0) {
+    std::ofstream face("clumps_pass.stl");
+    face << "solid face\n";
+    for (const char* third : {"0.0275 -0.0015", "-0.0015 0.0275"})
+      face << "facet normal 0 0 1\nouter loop\nvertex -0.0015 -0.0015 0.0\nvertex " << third
+           << " 0.0\nvertex 0.0275 0.0275 0.0\nendloop\nendfacet\n";
+    face << "endsolid face\n";
+  }
+  for (Engine* e : {&without, &with}) e->run(read(bed) + asleep + "run 600\n");
+  EXPECT_GT(with.vector("cull", 3), 1000);
+  with.run(
+      "fix face all mesh/surface/planar file clumps_pass.stl type 1\n"
+      "fix passed all massflow/mesh mesh face count once vec_side 0 0 -1\n");
+  for (Engine* e : {&without, &with}) e->run("run 100\nunfix cull\nrun 0\n");
+  expect_same_granules(without.state(), with.state());
+  constexpr std::size_t quaternion = 13;  // behind the centre and what moves
+  const ClumpRows rows = without.clumps();
+  for (const auto& [number, row] : with.clumps()) {
+    const std::vector<double>& due = rows.at(number);
+    ASSERT_EQ(row.size(), due.size() + 1);
+    EXPECT_EQ(row.back(), -1);
+    // those that the mesh has woken have moved by next to nothing since
+    for (std::size_t k = quaternion; k < due.size(); ++k)
+      EXPECT_LE(std::abs(row[k] - due[k]), 1e-6 * std::abs(due[k])) << "clump " << number << ", number " << k;
+  }
 }
 
 /// A clump that has lost a sphere is deleted, stored or not, as in stock.

@@ -382,6 +382,29 @@ TEST(GranuleStore, a_granule_of_its_own_size_takes_less_than_120_bytes) {
   EXPECT_LE(store.bytes_per_granule(), 120);
 }
 
+/// A clump's number is as many as its spheres are further by tag, and takes no room; any other comes back too.
+TEST(GranuleStore, numbers_of_clumps_come_back_and_those_in_order_take_no_room) {
+  const auto filled = [](auto number_of_clump) {
+    GranuleStore store(1);
+    for (int tag = 1; tag <= 3000; ++tag) {
+      StoredGranule g = granule(tag, Vec3(0.7 * tag, 0, 0), 0.3);
+      g.type = 1;
+      g.mass = 2;
+      g.spheres = 3;
+      g.clump = number_of_clump(tag);
+      store.add(g, nullptr, 0);
+      EXPECT_EQ(store.get(tag).clump, g.clump);
+      EXPECT_EQ(store.get(tag).spheres, 3);
+    }
+    return store.bytes_per_granule();
+  };
+  const double in_order = filled([](int tag) { return (tag + 2) / 3 + 1000; });
+  const double in_none = filled([](int tag) { return 1 + tag * 7919 % 1000003; });
+  EXPECT_LE(in_order, in_none - 7) << "a word of 8 bytes for each of them";
+  filled([](int tag) { return INT32_MAX - tag / 3; });
+  filled([](int tag) { return tag % 2 ? INT32_MAX / 3 : INT32_MAX / 3 + 1; });
+}
+
 TEST(GranuleStore, a_small_body_that_stands_still_takes_little) {
   GranuleStore store(0.01);
   constexpr int bodies = 5000;
