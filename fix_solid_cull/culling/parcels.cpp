@@ -301,6 +301,7 @@ void Parcels::take_granule(std::int64_t tag, const Taken& t) {
   const SolidBodies::Place at = bed_.solid.lock(tag, moving, bed_.masses.by_tag());
   SolidBody& to = bed_.solid.body(at.body);
   to.feel_as(from);
+  bed_.solid.stand_as(at.body, from, g.mass);
   if (moving.clump) {
     moving.clump->move(to.pose.to_world(at.position) - x);  // it may stand in another periodic image now
     moving.clump = moving.clump->in_frame(to.pose);

@@ -164,7 +164,19 @@ void Solid::ground(int body, bool on) {
   SolidBody& b = bodies_.body(body);
   if (b.grounded == on) return;
   b.ground(on);
-  if (on && store_->holds(body)) ++standing_version_;
+  grounded_or_let_go(body);
+}
+
+void Solid::stand_as(int body, const SolidBody& from, double mass) {
+  if (!from.grounded) return;
+  SolidBody& b = bodies_.body(body);
+  const bool stood = b.grounded;
+  b.stand_as(from, mass);
+  if (!stood) grounded_or_let_go(body);
+}
+
+void Solid::grounded_or_let_go(int body) {
+  if (stands(body) && store_->holds(body)) ++standing_version_;
   tell([&](BodyFollower& f) { f.grounded_or_let_go(body); });
   find_grid(body);
 }

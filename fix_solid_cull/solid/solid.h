@@ -136,6 +136,8 @@ class Solid {
   SolidBody& body(int number) { return bodies_.body(number); }
   std::map<int, SolidBody>& bodies_in_motion() { return bodies_.bodies(); }
   void ground(int body, bool on);
+  /// A granule of this mass (kg) came into it that was of a body elsewhere: where that stood, this one stands.
+  void stand_as(int body, const SolidBody& from, double mass);
   /// A grounded body of one granule, which is a sphere whatever way it is turned: the world's frame becomes its frame.
   void reframe_one(int body, const GranuleMass& in_world);
   /// Nothing is left of a body of this number.
@@ -217,6 +219,7 @@ class Solid {
   void find_grid(int body);
   bool is_large(std::size_t granules) const { return granules >= pack_from_; }
   InnerContacts::Tail take_from_graph(const StoredGranule& g, bool all_given);
+  void grounded_or_let_go(int body);
   void leaves_store(std::int64_t tag);
   void entered_store(std::int64_t tag);
   void drop_what_is_known(std::int64_t tag);

@@ -122,6 +122,12 @@ void SolidBody::settle() {
   take_twist();
 }
 
+void SolidBody::stand_as(const SolidBody& from, double granule_mass) {
+  const double before = grounded_mass;
+  if (!grounded) ground(true);
+  grounded_mass = before + (from.mass.mass > 0 ? granule_mass * from.grounded_mass / from.mass.mass : 0.0);
+}
+
 void SolidBody::settle_as_part(const RigidSum& whole, const FreeAxes& free, const Vec3& shift, double grounded_share) {
   if (grounded) grounded_mass = grounded_share * mass.mass;
   motion = RigidMotion(whole, free);

@@ -132,6 +132,8 @@ struct SolidBody {
 
   /// Walls hold it from now on, or do no longer. It stands still; a sphere may go on spinning on the spot.
   void ground(bool on);
+  /// A granule of this mass (kg) came into it that was of a grounded body elsewhere: it stands too.
+  void stand_as(const SolidBody& from, double granule_mass);
   void begin_to_rest();  ///< what is counted and summed since it was grounded or let go
   /// How many looks in a row it has rested now.
   std::int64_t rests(bool at_rest) { return looks_at_rest = at_rest ? looks_at_rest + 1 : 0; }

@@ -396,6 +396,48 @@ TEST(Snapshot, what_two_ranks_wrote_is_taken_up_by_any_number_of_ranks) {
   }
 }
 
+/// A body that stood does not have to come to rest anew, which may take it a while, and some way.
+TEST(Snapshot, a_body_that_stood_stands_on_any_number_of_ranks) {
+  SmallDeck deck = ranks_along_x(2);
+  deck.planes = {SmallDeck::ground(-0.999 * r)};
+  File file;
+  run_on_ranks(deck, [&](SmallWorld& w) {
+    WorldParts parts(w, sleeping_settings(), 2 * r);
+    std::vector<std::int64_t> tags;
+    for (int n = 0; n < 6; ++n) {
+      w.add(n + 1, Vec3(-0.025 + pressed * n, 0, 0), r);
+      tags.push_back(n + 1);
+    }
+    w.begin_run(nullptr);
+    w.reneighbour();
+    parts.walls.update(w.walls.contacts(), false);
+    parts.lock(tags);
+    parts.reneighbour();
+    for (auto& [number, body] : parts.bed.solid.bodies_in_motion()) {
+      ASSERT_GT(body.mass.held, 0);
+      parts.bed.solid.ground(number, true);
+    }
+    parts.bed.groups.settle();
+    file.write(w, parts);
+  });
+  for (const int ranks : {1, 2, 3}) {
+    deck.split = {ranks, 1, 1};
+    int bodies = 0;
+    std::mutex mutex;
+    run_on_ranks(deck, [&](SmallWorld& w) {
+      WorldParts parts(w, sleeping_settings(), 1.0);
+      file.read(w, parts);
+      const std::lock_guard<std::mutex> lock(mutex);
+      for (const auto& [number, body] : parts.bed.solid.bodies().bodies()) {
+        EXPECT_TRUE(body.grounded) << ranks << " ranks";
+        EXPECT_NEAR(body.grounded_mass, body.mass.mass, 1e-12 * body.mass.mass);
+        ++bodies;
+      }
+    });
+    EXPECT_GE(bodies, 1);
+  }
+}
+
 /// 22 x 6 x 6 granules, one body that turns; every fifth is an interface granule, and histories are what they were.
 struct Slab {
   explicit Slab(SmallWorld& w) : parts(w, sleeping_settings(), 2 * r) {
