@@ -128,6 +128,14 @@ class Examples(Scripts):
         self.assertTrue(result["metrics"]["left on the plate"]["good"], result["metrics"]["left on the plate"])
         self.assertEqual(result["metrics"]["granules outside"]["culled"], [0])
 
+    def test_clumps(self):
+        result, ends = self.example("clumps")
+        self.nothing_lost(result, 901)
+        self.close(result, 0.02, "v_depth", "v_depth:max", "v_force:max", "v_bedke:mean")
+        balls = [end[end["radius"] > examples.load("clumps").STRIKER] for end in ends]
+        self.assertEqual([len(ball) for ball in balls], [1, 1])
+        self.assertGreater(result["metrics"]["v_force:max"]["mean"], balls[0]["mass"][0] * GRAVITY, "the ball has not struck the bed")
+
     def test_cluster(self):
         """Its job is killed and goes on: example.py itself ends with 1 if a granule, an id or a mass is not there then."""
         result, ends = self.example("cluster")
@@ -142,7 +150,7 @@ class Examples(Scripts):
     def test_an_unknown_example(self):
         done = subprocess.run([str(ROOT / "examples" / "run.sh"), "nowhere"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.assertEqual((done.returncode, done.stdout), (2, ""))
-        self.assertIn("no example 'nowhere'; there is: cluster drum falling_mass impact plate_discharge", done.stderr)
+        self.assertIn("no example 'nowhere'; there is: clumps cluster drum falling_mass impact plate_discharge", done.stderr)
 
 
 class Validation(Scripts):

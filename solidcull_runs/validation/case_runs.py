@@ -11,7 +11,7 @@ from ..errors import RunError
 from ..logs import FROM_HERE
 from ..twins import KeptJob
 from .cases import short_hash
-from .points import BY_HAND, UNCULLED, points, runs_of
+from .points import BY_HAND, PAPER, UNCULLED, points, runs_of
 
 ASIDE = [k * 1e-5 for k in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5)]  # m: the place of a tool, ball or wall in each run
 FRAMES = 200                                                    # steps between two snapshots, if the case says nothing
@@ -143,8 +143,8 @@ def jobs_of(case, out, beds, launcher, fix, also=(), ranks=1):
         texts = [f.read_text() for f in sorted({*case.folder.glob("*.in"), *(case.folder.parent.parent / "shared").glob("*.in")} - {case.deck})]
         texts.append(bed.with_suffix(".recipe").read_text() if bed else "")
         main = scene == case.main_scene
-        wanted = [p for p in points(also) if (p.everywhere or main) and (p.family != BY_HAND or case.get("by_hand")) and
-                  (ranks == 1 or p.everywhere)]
+        left_out = {family for family, there in ((BY_HAND, case.get("by_hand")), (PAPER, case.get("paper", True))) if not there}
+        wanted = [p for p in points(also) if (p.everywhere or main) and p.family not in left_out and (ranks == 1 or p.everywhere)]
         for k in range(max(runs_of(p, main) for p in wanted)):
             for p in wanted:
                 if k >= runs_of(p, main):

@@ -12,6 +12,7 @@ case.py holds, as plain names:
 | `files(folder, v)` | optional: writes meshes and the like for the variables v; the deck finds the folder as ${files} |
 | `aside` | the variable that moves the tool, ball or wall by 10 um from run to run |
 | `by_hand` | optional: a region (style and arguments; the deck's variables) in which granules stay free when the rest is frozen by hand |
+| `paper` | optional: False where the paper's scheme cannot be run |
 | `curves` | metric -> thermo column, drawn against the column `time` |
 | `measure(run, v)` | the value of each metric of a run; `run.start`, `run.final`: granules at the fix line and at the end |
 | `laws(values)` | optional: of {scene: {metric: value}}, a list of (what, value, what is known) |
