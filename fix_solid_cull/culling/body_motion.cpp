@@ -71,7 +71,7 @@ void BodyMotion::list_clumps() {
   FlatMap<int> place;
   for (const int i : atoms_) {
     const Locked& e = bed_.shell[i];
-    if (e.clump == 0) continue;
+    if (e.clump == 0 || e.spheres == Locked::some_lost) continue;
     const auto known = place.find(e.clump);
     const std::size_t at = known ? static_cast<std::size_t>(*known) : clumps_.size();
     if (!known) {

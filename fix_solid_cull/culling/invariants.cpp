@@ -109,7 +109,7 @@ void Invariants::check_clumps() const {
   std::map<int, Seen> clumps;
   for (int i = 0; i < bed_.atoms.owned; ++i) {
     const Locked& e = bed_.shell[i];
-    if (!e.locked || e.clump == 0) continue;
+    if (!e.locked || e.clump == 0 || e.spheres == Locked::some_lost) continue;
     Seen& c = clumps[e.clump];
     ++c.interface_granules;
     c.spheres = e.spheres;

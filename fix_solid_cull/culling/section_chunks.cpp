@@ -6,6 +6,7 @@
 #include <string>
 
 #include "bits.h"
+#include "store_exchange.h"
 
 namespace solidcull {
 namespace {
@@ -382,6 +383,8 @@ void ChunkReader::read_granules(const WordTable& table, const double* numbers) {
     const std::uint64_t* at = row + g_numbers;
     g.each_number([&](auto& x) { read(x, *at++); });
     if (numbers) {
+      // the file does not have the motion that it had, to be given back in that step
+      if (g.lock_step == bed_.run.step) g.lock_step = StoreExchange::locked_long_ago;
       g.layout = layout_[index_below(static_cast<std::uint64_t>(g.layout), layout_.size())];
       g.record = numbers + r * table.columns + begin;
       g.length = static_cast<int>(table.columns - begin);

@@ -19,6 +19,7 @@ namespace solidcull {
 struct Locked {
   static constexpr double not_known = -1;
   static constexpr int arriving = -1;
+  static constexpr int some_lost = 0;  ///< of a clump's spheres, so that the others are to wake
 
   bool locked = false;
   bool fresh = false;               ///< the reference load is taken in this step
@@ -31,7 +32,8 @@ struct Locked {
   double excess = 0;                ///< largest load change over tolerance since it was last asked
   std::int64_t lock_step = -1;
   std::int64_t came_back = -1;                        ///< step in which it came out of the store
-  int clump = 0, spheres = 0;                         ///< number of the clump that it is a sphere of, and of how many; 0: none
+  int clump = 0, spheres = 0;                         ///< number of the clump that it is a sphere of, and of how many, or
+                                                      ///< `some_lost`; clump 0: none
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< at locking, given back only if no step has passed
 
   bool in_body() const { return locked && body > 0; }

@@ -26,8 +26,12 @@ enum Word {
   type_word,
   groups_word,
   colour_word,
-  words
+  clump_word,  // where there are clumps
+  arm_word,
+  words = arm_word + 3
 };
+
+int words_in(const SmallDeck& deck) { return deck.clumps ? words : clump_word; }
 
 double inertia(double mass, double radius) { return 0.4 * mass * radius * radius; }
 
@@ -399,9 +403,9 @@ SmallAtoms::SmallAtoms(SmallWorld& world) : world_(world), texts_{"sphere and co
 
 void SmallAtoms::grow(int new_room) {
   const std::size_t n = static_cast<std::size_t>(new_room);
-  for (std::vector<double>* three : {&x_, &v_, &omega_, &f_, &torque_}) three->resize(3 * n);
+  for (std::vector<double>* three : {&x_, &v_, &omega_, &f_, &torque_, &arm_}) three->resize(3 * n);
   for (std::vector<double>* one : {&radius_, &mass_, &colour}) one->resize(n);
-  for (std::vector<int>* one : {&tag_, &type_, &groups_}) one->resize(n);
+  for (std::vector<int>* one : {&tag_, &type_, &groups_, &clump_}) one->resize(n);
   histories_.resize(n);
   room = new_room;
   for (FollowsAtoms* follower : followers) follower->grow(new_room);
@@ -410,11 +414,11 @@ void SmallAtoms::grow(int new_room) {
 
 void SmallAtoms::fit(int new_room) {
   const std::size_t n = static_cast<std::size_t>(new_room);
-  for (std::vector<double>* three : {&x_, &v_, &omega_, &f_, &torque_})
+  for (std::vector<double>* three : {&x_, &v_, &omega_, &f_, &torque_, &arm_})
     *three = std::vector<double>(three->begin(), three->begin() + 3 * static_cast<std::ptrdiff_t>(n));
   room = new_room;
   for (std::vector<double>* one : {&radius_, &mass_, &colour}) one->resize(n);
-  for (std::vector<int>* one : {&tag_, &type_, &groups_}) one->resize(n);
+  for (std::vector<int>* one : {&tag_, &type_, &groups_, &clump_}) one->resize(n);
   histories_.resize(n);
   renew();
 }
@@ -430,13 +434,14 @@ void SmallAtoms::renew() {
   tag = tag_.data();
   type = type_.data();
   groups = groups_.data();
+  clump = clump_.data();
 }
 
 void SmallAtoms::copy(int from, int to) {
   const std::size_t a = static_cast<std::size_t>(from), b = static_cast<std::size_t>(to);
-  for (std::vector<double>* three : {&x_, &v_, &omega_, &f_, &torque_}) std::copy_n(&(*three)[3 * a], 3, &(*three)[3 * b]);
+  for (std::vector<double>* three : {&x_, &v_, &omega_, &f_, &torque_, &arm_}) std::copy_n(&(*three)[3 * a], 3, &(*three)[3 * b]);
   for (std::vector<double>* one : {&radius_, &mass_, &colour}) (*one)[b] = (*one)[a];
-  for (std::vector<int>* one : {&tag_, &type_, &groups_}) (*one)[b] = (*one)[a];
+  for (std::vector<int>* one : {&tag_, &type_, &groups_, &clump_}) (*one)[b] = (*one)[a];
   histories_[b] = Histories(histories_[a]);
   for (FollowsAtoms* follower : followers) follower->copy(from, to);
 }
@@ -454,10 +459,11 @@ int SmallAtoms::append() {
   world_.contacts.rows_are_invalid();
   if (owned == room) grow(2 * room);
   const std::size_t i = static_cast<std::size_t>(owned++);
-  for (std::vector<double>* three : {&x_, &v_, &omega_, &f_, &torque_}) std::fill_n(&(*three)[3 * i], 3, 0.0);
+  for (std::vector<double>* three : {&x_, &v_, &omega_, &f_, &torque_, &arm_}) std::fill_n(&(*three)[3 * i], 3, 0.0);
   histories_[i].clear();
   type_[i] = 1;
   groups_[i] = all_bit;
+  clump_[i] = 0;
   colour[i] = 0;
   for (FollowsAtoms* follower : followers) follower->reset(static_cast<int>(i));
   return static_cast<int>(i);
@@ -478,7 +484,7 @@ int SmallAtoms::find(int wanted) const {
 void SmallAtoms::pack(int i, std::vector<double>& record, int& layout) {
   const std::size_t k = static_cast<std::size_t>(i);
   layout = 0;
-  record.resize(words);
+  record.resize(static_cast<std::size_t>(words_in(world_.deck)));
   std::copy_n(x + 3 * k, 3, &record[at_word]);
   std::copy_n(v + 3 * k, 3, &record[velocity_word]);
   std::copy_n(omega + 3 * k, 3, &record[spin_word]);
@@ -488,6 +494,9 @@ void SmallAtoms::pack(int i, std::vector<double>& record, int& layout) {
   record[type_word] = type[i];
   record[groups_word] = groups[i];
   record[colour_word] = colour[k];
+  if (!world_.deck.clumps) return;
+  record[clump_word] = clump[i];
+  std::copy_n(&arm_[3 * k], 3, &record[arm_word]);
 }
 
 std::vector<int> SmallAtoms::motion_words(int, bool positions, bool spins) {
@@ -506,7 +515,8 @@ void SmallAtoms::take_out(int i) {
 }
 
 int SmallAtoms::put_back(const std::vector<double>& record, int layout) {
-  if (layout != 0 || record.size() != words) throw std::logic_error("a record of another layout");
+  if (layout != 0 || record.size() < static_cast<std::size_t>(words_in(world_.deck)))
+    throw std::logic_error("a record of another layout");
   const int i = append();
   const std::size_t k = static_cast<std::size_t>(i);
   std::copy_n(&record[at_word], 3, x + 3 * k);
@@ -518,6 +528,9 @@ int SmallAtoms::put_back(const std::vector<double>& record, int layout) {
   type_[k] = static_cast<int>(record[type_word]);
   groups_[k] = static_cast<int>(record[groups_word]);
   colour[k] = record[colour_word];
+  if (!world_.deck.clumps) return i;
+  clump_[k] = static_cast<int>(record[clump_word]);
+  std::copy_n(&record[arm_word], 3, &arm_[3 * k]);
   return i;
 }
 
@@ -526,6 +539,11 @@ void SmallAtoms::wrap(int i) { set_place(i, world_.run.wrapped(place(i))); }
 void SmallAtoms::set_size(int i, double radius, double mass) {
   radius_[static_cast<std::size_t>(i)] = radius;
   mass_[static_cast<std::size_t>(i)] = mass;
+}
+
+void SmallAtoms::set_clump(int i, int number, const Vec3& arm) {
+  clump[i] = number;
+  set(&arm_[3 * static_cast<std::size_t>(i)], arm);
 }
 
 int SmallAtoms::layout_from_text(const std::string& text) {
@@ -556,6 +574,7 @@ void SmallContacts::build() {
   first_.resize(owned);
   for (int i = 0; i < atoms.owned; ++i)
     for (int j = i + 1; j < atoms.owned + atoms.ghosts; ++j) {
+      if (world_.clumps.of(i) && world_.clumps.of(i) == world_.clumps.of(j)) continue;
       const double reach = atoms.radius[i] + atoms.radius[j] + world_.run.skin;
       if ((atoms.place(i) - atoms.place(j)).squaredNorm() < reach * reach)
         partners_[static_cast<std::size_t>(i)].push_back(j % 2 ? j | mark_ : j);
@@ -687,7 +706,8 @@ void SmallContacts::add_forces() {
     const Vec3 n = to_j / distance;
     const auto load = [&](int k, const Vec3& by, double radius, const Vec3& outward) {
       set(atoms.f + 3 * std::size_t(k), atoms.force(k) + by);
-      set(atoms.torque + 3 * std::size_t(k), vec(atoms.torque + 3 * std::size_t(k)) + (radius * outward).cross(by));
+      const double arm = world_.deck.arms_meet ? radius - 0.5 * (atoms.radius[i] + atoms.radius[j] - distance) : radius;
+      set(atoms.torque + 3 * std::size_t(k), vec(atoms.torque + 3 * std::size_t(k)) + (arm * outward).cross(by));
     };
     load(i, f, atoms.radius[i], n);
     if (width) all[atoms.tag[j]] = {length[0], length[1], length[2]};
@@ -898,6 +918,7 @@ void SmallMemory::fit() {
 SmallWorld::SmallWorld(const SmallDeck& its_deck, Meeting* meeting, int rank, int rank_count)
     : deck(its_deck),
       atoms(*this),
+      clumps(*this),
       contacts(*this),
       walls(*this),
       insertions(*this),
@@ -921,9 +942,16 @@ SmallWorld::SmallWorld(const SmallDeck& its_deck, Meeting* meeting, int rank, in
 
 double SmallWorld::mass_of(double radius) const { return deck.density * 4.0 / 3.0 * pi * radius * radius * radius; }
 
+Vec3 SmallWorld::image_shift(const Vec3& by) const {
+  Vec3 shift = Vec3::Zero();
+  for (int d = 0; d < 3; ++d)
+    if (run.periodic[static_cast<std::size_t>(d)]) shift[d] = run.edges()[d] * std::round(by[d] / run.edges()[d]);
+  return shift;
+}
+
 int SmallWorld::add(int tag, const Vec3& place, double radius, const Vec3& velocity, const Vec3& spin) {
   if (!ranks.owns(place)) return -1;
-  std::vector<double> record(words, 0.0);
+  std::vector<double> record(static_cast<std::size_t>(words_in(deck)), 0.0);
   set(&record[at_word], place);
   set(&record[velocity_word], velocity);
   set(&record[spin_word], spin);
@@ -940,14 +968,14 @@ int SmallWorld::add(int tag, const Vec3& place, double radius, const Vec3& veloc
 struct SmallWorld::Row {
   Triple x, v, omega;
   double radius, mass;
-  int tag, type, groups;
+  int tag, type, groups, clump;
 };
 
 std::vector<SmallWorld::Row> SmallWorld::owned_rows() const {
   std::vector<Row> rows;
   for (int i = 0; i < atoms.owned; ++i)
     rows.push_back({triple(atoms.place(i)), triple(atoms.velocity(i)), triple(atoms.spin(i)), atoms.radius[i], atoms.mass[i],
-                    atoms.tag[i], atoms.type[i], atoms.groups[i]});
+                    atoms.tag[i], atoms.type[i], atoms.groups[i], atoms.clump[i]});
   return rows;
 }
 
@@ -960,10 +988,16 @@ void SmallWorld::take_row(int i, const Row& row, const Vec3& shift) {
   const_cast<int*>(atoms.tag)[i] = row.tag;
   const_cast<int*>(atoms.type)[i] = row.type;
   atoms.groups[i] = row.groups;
+  atoms.clump[i] = row.clump;
+}
+
+void SmallWorld::exchange() {
+  exchange_atoms();
+  clumps.exchange();
 }
 
 /// Atoms go to the rank that owns their place; those outside of a box that is not periodic are lost.
-void SmallWorld::exchange() {
+void SmallWorld::exchange_atoms() {
   atoms.drop_ghosts();
   contacts.rows_are_invalid();
   std::vector<double> out;
@@ -1003,8 +1037,8 @@ void SmallWorld::exchange() {
       const double* one = &in[at];
       at += length;
       if (!ranks.owns(vec(one))) continue;
-      const int i = atoms.put_back(std::vector<double>(one, one + words), 0);
-      one += words;
+      const int i = atoms.put_back(std::vector<double>(one, one + words_in(deck)), 0);
+      one += words_in(deck);
       for (int k = static_cast<int>(*one++); k > 0; --k, one += 4)
         atoms.histories(i)[static_cast<int>(one[0])] = {one[1], one[2], one[3]};
       for (FollowsAtoms* follower : atoms.followers) {
@@ -1073,7 +1107,9 @@ void SmallWorld::compute_forces() {
   contacts.add_forces();
   walls.add_forces();
   for (int i = 0; i < atoms.owned; ++i)
-    if (atoms.groups[i] & atoms.gravity_bits) set(atoms.f + 3 * std::size_t(i), atoms.force(i) + atoms.mass[i] * deck.gravity);
+    if ((atoms.groups[i] & atoms.gravity_bits) && !clumps.of(i))
+      set(atoms.f + 3 * std::size_t(i), atoms.force(i) + atoms.mass[i] * deck.gravity);
+  clumps.take_loads();
 }
 
 void SmallWorld::kick(int i) {
@@ -1084,29 +1120,37 @@ void SmallWorld::kick(int i) {
 
 void SmallWorld::integrate_first_half() {
   for (int i = 0; i < atoms.owned; ++i) {
-    if (!(atoms.groups[i] & atoms.movable_bits)) continue;
+    if (!(atoms.groups[i] & atoms.movable_bits) || clumps.of(i)) continue;
     kick(i);
     atoms.set_place(i, atoms.place(i) + run.dt * atoms.velocity(i));
   }
+  clumps.kick();
+  clumps.drift();
   walls.move();
 }
 
 void SmallWorld::integrate_second_half() {
   for (int i = 0; i < atoms.owned; ++i)
-    if (atoms.groups[i] & atoms.movable_bits) kick(i);
+    if ((atoms.groups[i] & atoms.movable_bits) && !clumps.of(i)) kick(i);
+  clumps.kick();
+  clumps.give_velocities();
 }
 
 Vec3 SmallWorld::momentum() const {
   Vec3 p = Vec3::Zero();
-  for (int i = 0; i < atoms.owned; ++i) p += atoms.mass[i] * atoms.velocity(i);
+  for (int i = 0; i < atoms.owned; ++i)
+    if (!clumps.of(i)) p += atoms.mass[i] * atoms.velocity(i);
+  for (int k = 0; k < clumps.count(); ++k) p += clumps.clump(k).mass * clumps.clump(k).velocity;
   return p;
 }
 
 double SmallWorld::kinetic_energy() const {
   double e = 0;
+  for (int k = 0; k < clumps.count(); ++k) e += clumps.clump(k).kinetic_energy();
   for (int i = 0; i < atoms.owned; ++i)
-    e += 0.5 * atoms.mass[i] * atoms.velocity(i).squaredNorm() +
-         0.5 * inertia(atoms.mass[i], atoms.radius[i]) * atoms.spin(i).squaredNorm();
+    if (!clumps.of(i))
+      e += 0.5 * atoms.mass[i] * atoms.velocity(i).squaredNorm() +
+           0.5 * inertia(atoms.mass[i], atoms.radius[i]) * atoms.spin(i).squaredNorm();
   return e;
 }
 

@@ -1,5 +1,6 @@
-// A small world in memory that implements the ports of culling/ports.h: spheres, springs, walls, a velocity-Verlet integrator. On
-// one rank, or on several in one process, one thread each. SI units; world frame. No engine, no MPI.
+// A small world in memory that implements the ports of culling/ports.h: spheres, clumps of them (small_clumps.h), springs, walls,
+// a velocity-Verlet integrator. On one rank, or on several in one process, one thread each. SI units; world frame. No engine, no
+// MPI.
 #pragma once
 
 #include <array>
@@ -19,6 +20,7 @@
 #include "culling.h"
 #include "per_granule.h"
 #include "ports.h"
+#include "small_clumps.h"
 
 namespace solidcull {
 
@@ -74,6 +76,8 @@ struct SmallDeck {
   double density = 2500;
   double stiffness = 1000, damping = 0.5, friction = 0.5;  ///< N/m, N s/m, -
   double shear_stiffness = 500;                            ///< of the spring in the contact history (N/m)
+  bool arms_meet = false;  ///< arms of contacts end where they meet, and overlap nowhere: angular momentum is kept exactly
+  bool clumps = false;     ///< there may be some
 
   struct Plane {
     std::string name;
@@ -138,6 +142,10 @@ class SmallAtoms : public Atoms {
   void swap(int i, int j);  ///< owned ones; followers follow
   void fit(int new_room);
   Histories& histories(int i) { return histories_[static_cast<std::size_t>(i)]; }
+  Vec3 arm(int i) const { return vec(&arm_[3 * static_cast<std::size_t>(i)]); }  ///< in its clump's axes (m)
+  void set_clump(int i, int number, const Vec3& arm);
+
+  int* clump = nullptr;  ///< number of the clump that it is a sphere of; 0: none
 
   std::vector<double> colour;  ///< a column that the culling knows nothing of
   std::int64_t published = -1, returned_last = 0;
@@ -151,27 +159,10 @@ class SmallAtoms : public Atoms {
   void copy(int from, int to);
 
   SmallWorld& world_;
-  std::vector<double> x_, v_, omega_, f_, torque_, radius_, mass_;
-  std::vector<int> tag_, type_, groups_;
+  std::vector<double> x_, v_, omega_, f_, torque_, arm_, radius_, mass_;
+  std::vector<int> tag_, type_, groups_, clump_;
   std::vector<Histories> histories_;
   std::vector<std::string> texts_;
-};
-
-/// None.
-class SmallClumps : public Clumps {
- public:
-  int count() const override { return 0; }
-  Clump clump(int) const override { return {}; }
-  int find(int) const override { return -1; }
-  double largest() const override { return 0; }
-  void know_largest(double) override {}
-  int highest_number() const override { return 0; }
-  void keep_number(int) override {}
-  void publish_count(std::int64_t) override {}
-  Clump take(int) override { return {}; }
-  void put(const Clump&, int) override {}
-  void set_clump(int, int) override {}
-  void join_image(int, int) override {}
 };
 
 /// A linear spring and dashpot along the normal; along the surface a spring whose length is the contact's history, held by
@@ -371,6 +362,8 @@ class SmallWorld {
   int add(int tag, const Vec3& place, double radius, const Vec3& velocity = Vec3::Zero(), const Vec3& spin = Vec3::Zero());
   int at(int tag) const { return atoms.find(tag); }
   double mass_of(double radius) const;
+  /// The shift of a periodic image that is nearest to `by`.
+  Vec3 image_shift(const Vec3& by) const;
   /// What the engine does at a reneighbouring, but for its fixes: wrap, exchange, ghosts, lists. Collective.
   void reneighbour() {
     exchange();
@@ -392,7 +385,7 @@ class SmallWorld {
   }
   int builds = 0;  ///< neighbour lists built so far
 
-  Vec3 momentum() const;          ///< of this rank's atoms
+  Vec3 momentum() const;          ///< of this rank's atoms, and of the clumps that it moves
   double kinetic_energy() const;  ///< likewise
 
  private:
@@ -405,6 +398,7 @@ class SmallWorld {
   void take_row(int i, const Row& row, const Vec3& shift);
   void refresh_ghosts();
   bool moved_too_far();
+  void exchange_atoms();
   void integrate_first_half();
   void integrate_second_half();
   void kick(int i);
