@@ -256,7 +256,9 @@ TEST(Handover, what_was_put_away_a_little_beyond_a_border_waits) {
         Wakes all;
         all.all = true;
         parts.change(all, {});
-        if (w.ranks.me == 0) EXPECT_EQ(w.atoms.velocity(w.at(31)), before);
+        if (w.ranks.me == 0) {
+          EXPECT_EQ(w.atoms.velocity(w.at(31)), before);
+        }
         return;
       }
       ++w.run.step;
