@@ -56,8 +56,10 @@ void Cover::begin_run(bool a_wall_has_gone) {
   if (surface_) surface_->touch_all();
 }
 
+double Cover::plug_radius() const { return 0.5 * (bed_.scales.depth() + bed_.scales.closing()) + bed_.scales.diameter(); }
+
 void Cover::plug(const WallContact& c, const Vec3& at, const Vec3& outward, FlatMap<Sphere>& moving) {
-  const double radius = 0.5 * (bed_.scales.depth() + bed_.scales.closing()) + bed_.scales.diameter();
+  const double radius = plug_radius();
   constexpr int bits = 19;  // of a place along an axis; what is 2^18 diameters away may have the same
   const auto grid = [&](double x) {
     const auto cell = static_cast<std::int64_t>(std::floor(x / (0.5 * bed_.scales.diameter())));
@@ -72,15 +74,21 @@ void Cover::plug(const WallContact& c, const Vec3& at, const Vec3& outward, Flat
     const Sphere* before = moving_plugs_.find(place);
     moving[place] = before ? *before : plug;
     if (before) return;
-    surface_->touch(plug);
+    plug_changes(plug);
   } else {
     char& known = plugged_[place];
     if (known) return;
     known = 1;
     plugs_.push_back(plug);
-    surface_->touch({observer_.to_frame(plug.centre), plug.radius});
+    plug_changes({observer_.to_frame(plug.centre), plug.radius});
   }
+}
+
+/// It is there now, or no more; the observer's frame.
+void Cover::plug_changes(const Sphere& plug) {
   plugs_changed_ = true;
+  surface_->touch(plug);
+  if (bed_.ranks.has_neighbours()) changed_plugs_.push_back({observer_.to_world(plug.centre), plug.radius});
 }
 
 void Cover::close_behind_walls(const std::vector<WallContact>& contacts, const std::function<bool(int)>& rests) {
@@ -100,9 +108,7 @@ void Cover::close_behind_walls(const std::vector<WallContact>& contacts, const s
     plug(c, at, outward, moving);
   }
   moving_plugs_.for_each([&](std::int64_t place, const Sphere& plug) {
-    if (moving.contains(place)) return;
-    plugs_changed_ = true;
-    surface_->touch(plug);
+    if (!moving.contains(place)) plug_changes(plug);
   });
   moving_plugs_ = std::move(moving);
 }
@@ -143,7 +149,7 @@ void Cover::follow_largest_body() {
   for (const Sphere& plug : plugs_)
     for (const Pose* pose : {&before, const_cast<const Pose*>(&observer_)})
       surface_->touch({pose->to_frame(plug.centre), plug.radius});
-  plugs_changed_ = plugs_changed_ || !plugs_.empty();
+  plugs_changed_ = plugs_changed_ || !plugs_.empty() || !plugs_of_neighbours_.empty();
 }
 
 /// Over all ranks.
@@ -213,6 +219,34 @@ void Cover::draw_neighbours(std::vector<Sphere>& spheres) {
   neighbours_drawn_ = true;
 }
 
+/// The place behind a wall is no void for those beyond a border either.
+void Cover::share_plugs() {
+  if (!bed_.ranks.has_neighbours()) return;
+  struct PlugRow {
+    Triple at;
+    double radius;
+    bool stays;
+  };
+  std::vector<PlugRow> rows;
+  for (const Sphere& p : changed_plugs_) rows.push_back({triple(p.centre), p.radius, false});
+  for (const Sphere& p : plugs_) rows.push_back({triple(p.centre), p.radius, true});
+  moving_plugs_.for_each([&](std::int64_t, const Sphere& p) {
+    rows.push_back({triple(observer_.to_world(p.centre)), p.radius, true});
+  });
+  changed_plugs_.clear();
+  const std::size_t before = plugs_of_neighbours_.size();
+  plugs_of_neighbours_.clear();
+  for (const PlugRow& r : bed_.ranks.exchange(rows, bed_.scales.depth() + 2 * bed_.scales.closing() + plug_radius())) {
+    if (r.stays) {
+      plugs_of_neighbours_.push_back({vec(r.at), r.radius});
+    } else {
+      surface_->touch({observer_.to_frame(vec(r.at)), r.radius});
+      plugs_changed_ = true;
+    }
+  }
+  plugs_changed_ = plugs_changed_ || plugs_of_neighbours_.size() != before;
+}
+
 void Cover::draw() {
   make_surface();
   follow_largest_body();
@@ -223,11 +257,13 @@ void Cover::draw() {
   draw_atoms(moved, spheres);
   draw_bodies(moved);
   draw_neighbours(spheres);
+  share_plugs();
   drawn_at_last_look_ = atoms_and_stored(false);
   around_.build(std::move(spheres), 2 * bed_.scales.diameter());
   if (!plugs_changed_) return;
   std::vector<Sphere> plugs;
-  for (const Sphere& p : plugs_) plugs.push_back({observer_.to_frame(p.centre), p.radius});
+  for (const std::vector<Sphere>* some : {&plugs_, &plugs_of_neighbours_})
+    for (const Sphere& p : *some) plugs.push_back({observer_.to_frame(p.centre), p.radius});
   moving_plugs_.for_each([&](std::int64_t, const Sphere& p) { plugs.push_back(p); });
   plug_cells_.build(std::move(plugs), 4 * bed_.scales.diameter());
   plugs_changed_ = false;

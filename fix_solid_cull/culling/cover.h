@@ -85,7 +85,10 @@ class Cover : public BodyFollower, public StoreFollower {
   void draw_atoms(double moved, std::vector<Sphere>& spheres);
   void draw_bodies(double moved);
   void draw_neighbours(std::vector<Sphere>& spheres);
+  double plug_radius() const;
   void plug(const WallContact& c, const Vec3& at, const Vec3& outward, FlatMap<Sphere>& moving);
+  void plug_changes(const Sphere& plug);
+  void share_plugs();
   std::int64_t atoms_and_stored(bool drawn_only) const;
 
   /// Something to be drawn by neighbours, and where it was drawn until now, from there.
@@ -100,12 +103,14 @@ class Cover : public BodyFollower, public StoreFollower {
 
   PerGranule<Drawn> rows_;
   std::unique_ptr<ImplicitSurface> surface_;
-  SphereCells around_;              // owned granules and halo at the last look; the observer's frame
-  std::vector<Row> to_neighbours_;  // in this look
-  std::vector<Sphere> plugs_;       // behind still walls; world frame
-  FlatMap<char> plugged_;           // places that have one
-  FlatMap<Sphere> moving_plugs_;    // behind walls that can move, as seen at the last look; the observer's frame
-  SphereCells plug_cells_;          // all plugs; the observer's frame
+  SphereCells around_;                       // owned granules and halo at the last look; the observer's frame
+  std::vector<Row> to_neighbours_;           // in this look
+  std::vector<Sphere> plugs_;                // behind still walls; world frame
+  FlatMap<char> plugged_;                    // places that have one
+  FlatMap<Sphere> moving_plugs_;             // behind walls that can move, as seen at the last look; the observer's frame
+  std::vector<Sphere> changed_plugs_;        // in this look, to be told to neighbours; world frame
+  std::vector<Sphere> plugs_of_neighbours_;  // near this rank at the last look; world frame
+  SphereCells plug_cells_;                   // all plugs; the observer's frame
   bool plugs_changed_ = false;
   bool neighbours_drawn_ = false;
   std::int64_t drawn_at_last_look_ = 0;  // atoms and stored granules, over all ranks

@@ -14,8 +14,11 @@ void Handover::merged(int gone, int kept, bool) {
   at_home_.erase(from);
 }
 
-/// A stored one may lag behind by the slack: bodies that have not moved by it since they were last looked through are left.
+/// A stored one may lag behind by the slack: bodies that have not moved by it since they were last looked through are left. So
+/// are granules that were put away in this very step, a little beyond a border: they still have the motion of before here.
 std::vector<std::int64_t> Handover::stored_elsewhere() {
+  const double waits = 0.25 * bed_.stored.slack();
+  const Box nearby = bed_.ranks.own().grown_by(waits);
   std::vector<std::int64_t> tags;
   bed_.solid.store().for_each_frame([&](int frame, const Vec3& lo, const Vec3& hi) {
     const Pose& pose = bed_.solid.pose_of_frame(frame);
@@ -25,9 +28,14 @@ std::vector<std::int64_t> Handover::stored_elsewhere() {
       home.way = largest_way(home.pose, pose, lo, hi);
       if (home.way + home.lag < 0.5 * bed_.stored.slack()) return;
     }
-    at_home_[frame] = {pose};
+    Home& home = at_home_[frame] = {pose};
     bed_.solid.store().for_each_in_box(frame, lo, hi, [&](const Resident& g) {
-      if (!bed_.ranks.owns(bed_.solid.in_world(g)) && !follows_another(g.tag)) tags.push_back(g.tag);
+      const Vec3 x = bed_.solid.in_world(g);
+      if (bed_.ranks.owns(x) || follows_another(g.tag)) return;
+      if (bed_.solid.store().transient_known(g.tag) && nearby.holds(x))
+        home.lag = waits;
+      else
+        tags.push_back(g.tag);
     });
   });
   std::sort(tags.begin(), tags.end());

@@ -49,7 +49,7 @@ class Handover : public BodyFollower {
   struct Home {
     Pose pose;
     double way = 0;  // since then, when last looked (m)
-    double lag = 0;  // the way of those that have come from other frames without being compared (m)
+    double lag = 0;  // how far those may be outside already that wait, or have come from other frames without being compared (m)
   };
   bool follows_another(std::int64_t tag) const;
   void keep_clumps_whole(const std::vector<DeepGranules::AwayFromHome>& away);

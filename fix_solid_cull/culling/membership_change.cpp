@@ -178,6 +178,11 @@ void MembershipChange::thaw_and_unlock() {
   if (bed_.clumps.possible)  // what has mass goes last
     std::stable_partition(changes_.freed.begin(), changes_.freed.end(),
                           [&](std::int64_t tag) { return bed_.locked_clumps.find(tag) == nullptr; });
+  // what those that go back as they were do not take stays with the rest of their body, so they leave first; but over ranks a
+  // rank would leave it with its own part of the rest
+  const bool back_first = bed_.ranks.count == 1;
+  std::stable_partition(changes_.freed.begin(), changes_.freed.end(),
+                        [&](std::int64_t tag) { return goes_back(bed_.index.at(tag)) == back_first; });
   for (const std::int64_t tag : changes_.freed) leave_body(tag);
   changes_.freed_anywhere.for_each([&](std::int64_t tag, char) { bed_.solid.thaw(tag); });
   bed_.split_bodies();
@@ -188,12 +193,14 @@ void MembershipChange::thaw_and_unlock() {
   }
 }
 
+/// Nothing has moved since it was locked: it goes on as if it had never been; else it starts from its body's motion.
+bool MembershipChange::goes_back(int i) const { return bed_.shell[i].lock_step == bed_.run.step; }
+
 void MembershipChange::leave_body(std::int64_t tag) {
   const int body = bed_.solid.bodies().body_of(tag), i = bed_.index.at(tag);
   Atoms& atoms = bed_.atoms;
   const Vec3 x = bed_.solid.bodies().pose(body).to_world(bed_.shell[i].place);
-  // nothing has moved since it was locked: it goes on as if it had never been; else it starts from its body's motion
-  const bool back = bed_.shell[i].lock_step == bed_.run.step;
+  const bool back = goes_back(i);
   const Twist twist = bed_.solid.bodies().body(body).twist;
   atoms.set_velocity(i, back ? bed_.shell[i].velocity : twist.at(x));
   if (bed_.contacts.turn_granules) atoms.set_spin(i, back ? bed_.shell[i].spin : twist.spin);

@@ -51,6 +51,7 @@ class MembershipChange {
   void give_clump_back(int sphere, int body, bool as_it_was, MovingGranule& given);
   bool still_rests(int i) const;
   void thaw_and_unlock();
+  bool goes_back(int i) const;
   void leave_body(std::int64_t tag);
   void freeze_and_lock();
   void lock_into_body(std::int64_t tag);

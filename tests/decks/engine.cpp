@@ -81,11 +81,11 @@ void write_side(const std::string& file, double side) {
 
 }  // namespace
 
-Engine::Engine() {
+Engine::Engine(MPI_Comm ranks) {
   std::vector<std::string> words = {"liggghts", "-log", "none", "-screen", "deck_tests.screen"};
   std::vector<char*> args;
   for (std::string& w : words) args.push_back(&w[0]);
-  lmp_ = new LAMMPS_NS::LAMMPS(static_cast<int>(args.size()), args.data(), MPI_COMM_WORLD);
+  lmp_ = new LAMMPS_NS::LAMMPS(static_cast<int>(args.size()), args.data(), ranks);
   in_deck_ = std::make_unique<solidcull::ProgramCall>(lmp_, solidcull::ProgramCall::By::library);
 }
 
@@ -236,11 +236,11 @@ std::string grid() {
   return asked ? asked : "* * 1";
 }
 
-std::string head(const Bed& bed) {
+std::string head(const Bed& bed, const std::string& cuts) {
   return std::string("atom_style granular\natom_modify map array\nboundary ") + (bed.periodic ? "p p f" : "f f f") +
          "\nnewton off\ncommunicate single vel yes\nunits si\n"
          "processors " +
-         grid() + "\n";
+         cuts + "\n";
 }
 
 std::string body(const Bed& bed) {
@@ -271,10 +271,10 @@ std::string body(const Bed& bed) {
   return s.str();
 }
 
-std::string pouring(const Bed& bed) {
+std::string pouring(const Bed& bed, const std::string& cuts) {
   std::ostringstream s;
   const double rim = bed.periodic ? 0 : 0.002;
-  s << head(bed) << "region reg block " << -rim << ' ' << bed.side + rim << ' ' << -rim << ' ' << bed.side + rim
+  s << head(bed, cuts) << "region reg block " << -rim << ' ' << bed.side + rim << ' ' << -rim << ' ' << bed.side + rim
     << " -0.002 0.15\n"
     << "create_box 2 reg\nneighbor 0.0006 bin\nneigh_modify delay 0\n"
     << body(bed)
@@ -292,22 +292,23 @@ std::string pouring(const Bed& bed) {
 std::string settled(const Bed& bed) {
   static std::set<std::string> made;
   const std::string file = "bed_" + bed.name + ".restart";
-  if (made.count(bed.name)) return file;
-  Engine e;
-  if (e.rank() == 0) {
+  if (!made.insert(bed.name).second) return file;
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  if (rank == 0) {
     write_floor(bed.name + "_floor.stl", bed.side);
     write_side(bed.name + "_side.stl", bed.side);
+    const auto steps = [&](double at_3e5) { return static_cast<int>(std::lround(at_3e5 * 3e-5 / bed.dt)); };
+    std::ostringstream s;
+    s << pouring(bed, "1 1 1") << "run " << steps(4000) << "\nunfix ins\n"
+      << "fix visc all viscous 0.002\nrun " << steps(6000) << "\n";
+    // spin about a lone contact has no damping in most models: stopped by hand, until the bed is at rest
+    for (int k = 0; k < 8; ++k)
+      s << "set group all omegax 0 omegay 0 omegaz 0\nvelocity all set 0 0 0\nrun " << steps(700) << "\n";
+    s << "unfix visc\nwrite_restart " << file << "\n";
+    Engine(MPI_COMM_SELF).run(s.str());
   }
   MPI_Barrier(MPI_COMM_WORLD);
-  const auto steps = [&](double at_3e5) { return static_cast<int>(std::lround(at_3e5 * 3e-5 / bed.dt)); };
-  std::ostringstream s;
-  s << pouring(bed) << "run " << steps(4000) << "\nunfix ins\n"
-    << "fix visc all viscous 0.002\nrun " << steps(6000) << "\n";
-  // spin about a lone contact has no damping in most models: stopped by hand, until the bed is at rest
-  for (int k = 0; k < 8; ++k) s << "set group all omegax 0 omegay 0 omegaz 0\nvelocity all set 0 0 0\nrun " << steps(700) << "\n";
-  s << "unfix visc\nwrite_restart " << file << "\n";
-  e.run(s.str());
-  made.insert(bed.name);
   return file;
 }
 

@@ -39,7 +39,7 @@ using Histories = std::map<std::pair<int, int>, std::vector<double>>;
 /// Tests look at the engine as a deck leaves it between two of its commands: culled granules are none of its atoms then.
 class Engine {
  public:
-  Engine();
+  explicit Engine(MPI_Comm ranks = MPI_COMM_WORLD);
   ~Engine();
   Engine(const Engine&) = delete;
 
@@ -85,18 +85,19 @@ struct Bed {
   friend void PrintTo(const Bed& bed, std::ostream* out) { *out << bed.name; }
 };
 
-std::string grid();                    ///< how a deck cuts the box
-std::string head(const Bed& bed);      ///< up to the box
-std::string body(const Bed& bed);      ///< material, walls, gravity
-std::string read_bed(const Bed& bed);  ///< reads the settled bed (made once, see settled())
+std::string grid();                                                  ///< how a deck cuts the box
+std::string head(const Bed& bed, const std::string& cuts = grid());  ///< up to the box
+std::string body(const Bed& bed);                                    ///< material, walls, gravity
+std::string read_bed(const Bed& bed);                                ///< reads the settled bed (made once, see settled())
 /// A deck up to the first run of a pour into an empty box.
-std::string pouring(const Bed& bed);
+std::string pouring(const Bed& bed, const std::string& cuts = grid());
 /// 64 granules fall on the bed.
 extern const char* const rain_of_64;
 /// Lets them fall for 3,000 steps, and expects that none is lost, here and in the store of the fix `cull`. How many there are.
 /// Collective.
 std::size_t rain_on(Engine& e, const Bed& bed);
-/// Pours and settles the bed once for all tests of a process and returns the restart file's name. Collective.
+/// Pours and settles the bed once for all tests of a process, on one rank, so that it is the same whatever the grid; returns the
+/// restart file's name. Collective.
 std::string settled(const Bed& bed);
 
 }  // namespace decks

@@ -48,7 +48,10 @@ TEST(NewGranules, FindTheirRowsAsIfNoneHadBeenThere) {
   ASSERT_GT(culled.vector("cull", 3), 600) << "hardly a row is vacated";
   culled.run(come);
   for (const char* fix : {"moved_COMPUTE_STORE", "was"}) {
-    const auto expected = kept_for_new_granules(never, fix, bed.granules);
+    auto expected = kept_for_new_granules(never, fix, bed.granules);
+    // on more ranks stock's rows are not all fresh: what is in them is chance
+    if (never.ranks() > 2)
+      for (auto& [tag, row] : expected) row.assign(row.size(), 0.0);
     EXPECT_FALSE(expected.empty() && never.ranks() == 1) << fix;
     EXPECT_EQ(kept_for_new_granules(culled, fix, bed.granules), expected) << fix;
   }

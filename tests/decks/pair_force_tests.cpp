@@ -1,6 +1,7 @@
 // PairForce against the force that the engine itself gives two granules, and against Hertz's formula.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -20,14 +21,17 @@ using solidcull::Vec3;
 
 constexpr double radius = 0.0013, other_radius = 0.0017;  // m
 
-/// Two granules whose centres are `apart` from each other, free of gravity, in the middle of the box: on two ranks each has one.
-std::string two(const Bed& bed, double apart) {
+constexpr double side = 0.04;  // m, of the box
+
+/// Two granules whose centres are `apart` from each other, free of gravity. On several ranks, in a row along x, they are on both
+/// sides of the first border: each is on a rank of its own.
+std::string two(const Bed& bed, double apart, int ranks) {
   const auto x = [&](double sign) {
     char text[32];
-    std::snprintf(text, sizeof text, "%.17g", 0.02 + sign * apart / 2);
+    std::snprintf(text, sizeof text, "%.17g", side / std::max(ranks, 2) + sign * apart / 2);
     return std::string(text);
   };
-  return head(bed) +
+  return head(bed, "* 1 1") +
          "region box block 0 0.04 0 0.04 0 0.04 units box\ncreate_box 2 box\nneighbor 0.0004 bin\nneigh_modify delay 0\n" +
          body(bed) + "unfix grav\ncreate_atoms 1 single " + x(-1) + " 0.02 0.02 units box\ncreate_atoms 2 single " + x(1) +
          " 0.02 0.02 units box\nset atom 1 diameter 0.0026\nset atom 2 diameter 0.0034\nset group all density 2500\n"
@@ -84,7 +88,7 @@ TEST_P(PairForces, IsTheEnginesOwn) {
   bed.cohesion = bed.contact.find("cohesion") != std::string::npos;
   Engine e;
   // it slides and turns while it is pressed: springs and dampers of every kind bear
-  e.run(two(bed, radius + other_radius - 4e-5) +
+  e.run(two(bed, radius + other_radius - 4e-5, e.ranks()) +
         "velocity all set 0 0 0\ngroup one id 1\ngroup other id 2\nvelocity one set 0.01 0.02 -0.03\nset atom 1 omegay 8\n"
         "set atom 2 omegaz -5\nrun 4\nrun 0\n");  // the last: forces of the state that is there now
   const State before = e.state();
@@ -112,7 +116,7 @@ TEST_P(PairForces, LeavesTheRunAsItWouldBe) {
   bed.cohesion = bed.contact.find("cohesion") != std::string::npos;
   Engine never, asked;
   for (Engine* e : {&never, &asked}) {
-    e->run(two(bed, radius + other_radius - 4e-5) + "group one id 1\nvelocity one set 0.02 0.05 -0.03\n");
+    e->run(two(bed, radius + other_radius - 4e-5, e->ranks()) + "group one id 1\nvelocity one set 0.02 0.05 -0.03\n");
     for (int k = 0; k < 8; ++k) {
       e->run("run 5\n");
       if (e == &asked) ask(*e);
@@ -141,7 +145,7 @@ TEST(PairForce, OfTwoAtRestIsHertzs) {
   Bed bed;
   bed.contact = "model hertz tangential history";
   Engine e;
-  e.run(two(bed, radius + other_radius - overlap) + "run 0\n");
+  e.run(two(bed, radius + other_radius - overlap, e.ranks()) + "run 0\n");
   const double expected = 4.0 / 3 * stiffness * std::sqrt(reduced) * std::pow(overlap, 1.5);
   const Asked asked = ask(e);
   EXPECT_NEAR(asked.by_place[0], -expected, 1e-11 * expected);  // the overlap is a difference of places 700 times as large
@@ -152,7 +156,7 @@ TEST(PairForce, OfTwoAtRestIsHertzs) {
 
 TEST(PairForce, OfTwoThatDoNotTouchIsNone) {
   Engine e;
-  e.run(two(Bed(), radius + other_radius + 1e-5) + "run 0\n");
+  e.run(two(Bed(), radius + other_radius + 1e-5, e.ranks()) + "run 0\n");
   const Asked asked = ask(e);
   ASSERT_EQ(asked.rows, 1) << "they are neighbours";
   EXPECT_EQ(size(asked.by_place), 0);
@@ -164,7 +168,8 @@ TEST(PairForce, FollowsTheHistoryThatItIsGiven) {
   Bed bed;
   bed.contact = "model hertz tangential history";
   Engine e;
-  e.run(two(bed, radius + other_radius - 4e-5) + "displace_atoms all move 0.01 0 0 units box\nrun 0\n");  // one rank has both
+  e.run(two(bed, radius + other_radius - 4e-5, e.ranks()) + "displace_atoms all move " +
+        std::to_string(0.5 * side / std::max(e.ranks(), 2)) + " 0 0 units box\nrun 0\n");  // one rank has both
   auto* pair = static_cast<LAMMPS_NS::PairGran*>(e.lammps()->force->pair);
   ASSERT_EQ(pair->dnum(), 3);
   PairForce law(e.lammps());

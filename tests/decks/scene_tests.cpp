@@ -1,6 +1,7 @@
 // What a user's deck must see: loads, ids, restarts, fines, ramps. Each culled run stands beside one that never culls.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -98,31 +99,33 @@ TEST(Scenes, ABedThatSleepsStillWeighsOnItsWalls) {
 }
 
 TEST(Scenes, GranulesThatSpinOnTheSpotSleepAndGoOnSpinning) {
-  // 12 that spin about the normal of the floor, each beside one that it does not touch
-  const Bed bed = mesh_bed("asleep");
+  // 64 that spin about the normal of the floor, each beside one that it does not touch: a rank of eight has enough to store them
+  Bed bed = mesh_bed("asleep");
   settled(bed);  // writes its floor
+  bed.dt = 1.5e-5;
+  constexpr int count = 128;
   std::string granules, spins;
-  for (int k = 0; k < 12; ++k) {
-    const double x = 0.003 + 0.007 * (k % 3), y = 0.004 + 0.006 * (k / 3);
-    for (const double beside : {0.0, 0.00261})
-      granules += "create_atoms 1 single " + std::to_string(x + beside) + ' ' + std::to_string(y) + " 0.0013 units box\n";
+  for (int k = 0; k < count / 2; ++k) {
+    const double x = 0.0015 + 0.0031 * (k % 8), y = 0.0015 + 0.0031 * (k / 8);
+    for (const double beside : {0.0, 0.00131})
+      granules += "create_atoms 1 single " + std::to_string(x + beside) + ' ' + std::to_string(y) + " 0.00065 units box\n";
     spins += "set atom " + std::to_string(2 * k + 1) + " omegaz 60\n";
   }
   Engine e;
   e.run(head(bed) + "region box block -0.002 0.028 -0.002 0.028 -0.002 0.15 units box\ncreate_box 2 box\nneighbor 0.0004 bin\n" +
         "neigh_modify delay 0\n" + body(bed) + granules +
-        "set group all diameter 0.0026\nset group all density 2500\nfix integr all nve/sphere\nthermo 100000\n"
-        "thermo_modify norm no\nrun 3000\n" +
+        "set group all diameter 0.0013\nset group all density 2500\nfix integr all nve/sphere\nthermo 100000\n"
+        "thermo_modify norm no\nrun 6000\n" +
         spins + "fix cull all solid/cull exterior sleep every 50\nrun 1500\n");
-  expect_all_there(e, "cull", 24);
+  expect_all_there(e, "cull", count);
   EXPECT_EQ(e.state().size(), 1u) << "all but the highest tag are in the store";
   EXPECT_EQ(f(e, 1), 0);
-  const double weight = 24 * e.state().at(24).mass * 9.81;
+  const double weight = count * e.state().at(count).mass * 9.81;
   EXPECT_NEAR(std::abs(e.vector("floor", 3)), weight, 1e-4 * weight);
   e.run("unfix cull\nrun 0\n");
   const State s = e.state();
-  ASSERT_EQ(s.size(), 24u);
-  for (int tag = 1; tag <= 24; ++tag) EXPECT_NEAR(s.at(tag).omega[2], tag % 2 ? 60 : 0, 1e-9) << "granule " << tag;
+  ASSERT_EQ(s.size(), std::size_t(count));
+  for (int tag = 1; tag <= count; ++tag) EXPECT_NEAR(s.at(tag).omega[2], tag % 2 ? 60 : 0, 1e-9) << "granule " << tag;
 }
 
 TEST(Scenes, WhatRestsOnAFloorThatIsUnfixedFalls) {
@@ -138,7 +141,9 @@ TEST(Scenes, WhatRestsOnAFloorThatIsUnfixedFalls) {
   never.run(read_bed(bed) + "run 1500\n" + no_floor);
   e.run(no_floor);
   EXPECT_NEAR(e.vector("side", 1), never.vector("side", 1), 1e-3 * weight);
-  EXPECT_NEAR(e.vector("side", 3), never.vector("side", 3), 0.01 * weight);  // what has begun to fall rubs: 0.6 % of the weight
+  const double rubs = never.vector("side", 3);  // what has begun to fall; in the culled bed less of it may have
+  EXPECT_GE(e.vector("side", 3), std::min(0.0, rubs) - 1e-3 * weight);
+  EXPECT_LE(e.vector("side", 3), std::max(0.0, rubs) + 1e-3 * weight);
   EXPECT_GT(std::abs(e.vector("side", 1)), 0.1 * weight);
   e.run("run 400\n");
   EXPECT_GT(f(e, 7), 1250) << "what rested on the floor wakes";

@@ -83,6 +83,35 @@ TEST(BodyGroups, parts_that_touch_across_borders_have_one_key_and_one_motion_whi
   }
 }
 
+/// One goes back as it was in the step in which it was locked. The others have rested: on one rank they do so again.
+TEST(BodyGroups, what_leaves_with_one_that_goes_back_has_the_motion_of_its_body) {
+  for (const int ranks : {1, 2})
+    run_on_ranks(ranks_along_x(ranks), [&](SmallWorld& w) {
+      const Vec3 own(0, 1e-2, 0);
+      w.add(21, Vec3(-0.005, apart, 0), r, own);
+      Row row(w, std::vector<Vec3>(6, Vec3::Zero()), -0.005);  // of two ranks the first has one of them
+      WorldParts& parts = row.parts;
+      parts.reneighbour();
+      ++w.run.step;
+      parts.lock({21});
+      EXPECT_EQ(parts.body_of(21), parts.body_of(1));
+      std::map<int, Vec3> due;
+      for (const std::int64_t tag : row.tags)
+        if (const int body = parts.body_of(tag)) {
+          const int i = static_cast<int>(tag);
+          due[i] = ranks == 1 ? Vec3(Vec3::Zero()) : parts.bed.solid.bodies().body(body).twist.at(w.atoms.place(w.at(i)));
+        }
+      EXPECT_FALSE(due.empty());
+      Wakes all;
+      all.all = true;
+      parts.change(all, {});
+      for (const auto& [tag, velocity] : due) EXPECT_LE((w.atoms.velocity(w.at(tag)) - velocity).norm(), 1e-15) << tag;
+      if (w.at(21) >= 0) {
+        EXPECT_EQ(w.atoms.velocity(w.at(21)), own);
+      }
+    });
+}
+
 TEST(BodyGroups, each_body_is_counted_once_over_all_ranks_and_ghosts_know_their_body) {
   run_on_ranks(ranks_along_x(2), [](SmallWorld& w) {
     Row row(w, some_velocities(4), -1.5 * apart);  // two on either side of the border

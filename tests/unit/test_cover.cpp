@@ -208,26 +208,32 @@ TEST(Cover, a_mass_that_moves_as_one_keeps_its_surface_and_the_observer_rides_on
 }
 
 TEST(Cover, depth_does_not_see_borders_between_ranks) {
-  SmallDeck deck = empty_space();
-  deck.box = {Vec3(-0.1, -0.1, -0.1), Vec3(0.3, 0.3, 0.3)};
-  std::map<int, bool> deep[3];
-  for (const int ranks : {1, 2}) {
-    deck.split = {ranks, 1, 1};
-    std::mutex mutex;
-    run_on_ranks(deck, [&](SmallWorld& w) {
-      WorldParts parts(w, living_settings(), 2 * r);
-      for (int k = 0; k < 343; ++k) w.add(k + 1, Vec3(0.07, 0, 0) + apart * Vec3(k % 7, k / 7 % 7, k / 49), r);
-      w.reneighbour();
-      parts.cover.draw();
-      const std::lock_guard<std::mutex> lock(mutex);
-      for (int i = 0; i < w.atoms.owned; ++i) deep[ranks][w.atoms.tag[i]] = parts.cover.is_deep(i);
-    });
+  enum Floor { none, still, moving };
+  for (const Floor floor : {none, still, moving}) {
+    SmallDeck deck = empty_space();
+    deck.box = {Vec3(-0.1, -0.1, -0.1), Vec3(0.3, 0.3, 0.3)};
+    if (floor != none) deck.planes = {SmallDeck::ground(-r)};
+    if (floor == moving) deck.planes[0].moving = true;
+    std::map<int, bool> deep[3];
+    for (const int ranks : {1, 2}) {
+      deck.split = {ranks, 1, 1};
+      std::mutex mutex;
+      run_on_ranks(deck, [&](SmallWorld& w) {
+        WorldParts parts(w, living_settings(), 2 * r);
+        for (int k = 0; k < 343; ++k) w.add(k + 1, Vec3(0.07, 0, 0) + apart * Vec3(k % 7, k / 7 % 7, k / 49), r);
+        w.reneighbour();
+        parts.cover.close_behind_walls(w.walls.contacts(), [](int) { return true; });
+        parts.cover.draw();
+        const std::lock_guard<std::mutex> lock(mutex);
+        for (int i = 0; i < w.atoms.owned; ++i) deep[ranks][w.atoms.tag[i]] = parts.cover.is_deep(i);
+      });
+    }
+    EXPECT_EQ(deep[1].size(), 343u);
+    EXPECT_EQ(deep[1], deep[2]) << "floor " << floor;
+    int n = 0;
+    for (const auto& d : deep[1]) n += d.second;
+    EXPECT_EQ(n, floor == none ? 27 : 45);  // the inner three of seven each way; down to the floor
   }
-  EXPECT_EQ(deep[1].size(), 343u);
-  EXPECT_EQ(deep[1], deep[2]);
-  int n = 0;
-  for (const auto& d : deep[1]) n += d.second;
-  EXPECT_EQ(n, 27);  // the inner three of seven each way
 }
 
 }  // namespace

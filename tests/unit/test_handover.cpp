@@ -207,6 +207,8 @@ TEST(Handover, what_merges_lags_behind_by_the_ways_of_both_bodies) {
     parts.lock({31, 32, 33});
     parts.put_away({31});
     parts.reneighbour();
+    ++w.run.step;
+    parts.exchange.forget_past_motions();
     const auto looks = [&] {
       parts.bed.index.index(w.atoms);
       return parts.handover.stored_elsewhere();
@@ -225,6 +227,46 @@ TEST(Handover, what_merges_lags_behind_by_the_ways_of_both_bodies) {
     const std::vector<std::int64_t> found = looks();
     EXPECT_EQ(std::count(found.begin(), found.end(), 31), w.ranks.me == 0);
   });
+}
+
+/// Its own motion is known for the step in which it was put away, and on this rank.
+TEST(Handover, what_was_put_away_a_little_beyond_a_border_waits) {
+  for (const bool at_once : {false, true})
+    run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
+      constexpr double d = 2 * r;
+      Settings compact = sleeping_settings();
+      compact.store = Store::compact;
+      for (int n = 0; n < 3; ++n) {
+        w.add(31 + n, Vec3(-1e-5 - pressed * n, 0.05, 0), r, Vec3(0.01 * n, 0.02, 0));
+        w.add(41 + n, Vec3(-1e-5 - pressed * n, -0.05, 0), r);
+      }
+      WorldParts parts(w, compact, d);
+      w.begin_run(nullptr);
+      // since the last exchange, and the second one by far
+      for (const auto& [tag, way] : {std::pair(31, 2e-5), std::pair(41, 0.4 * d)})
+        if (w.at(tag) >= 0) w.atoms.set_place(w.at(tag), w.atoms.place(w.at(tag)) + Vec3(way, 0, 0));
+      const Vec3 before = w.at(31) >= 0 ? w.atoms.velocity(w.at(31)) : Vec3(Vec3::Zero());
+      parts.lock({31, 32, 33, 41, 42, 43});
+      parts.put_away({31, 41});
+      parts.bed.index.index(w.atoms);
+      EXPECT_TRUE(parts.send_home());
+      EXPECT_EQ(parts.bed.solid.store().contains(31), w.ranks.me == 0);
+      EXPECT_EQ(parts.bed.solid.store().contains(41), w.ranks.me == 1);
+      if (at_once) {
+        Wakes all;
+        all.all = true;
+        parts.change(all, {});
+        if (w.ranks.me == 0) {
+          EXPECT_EQ(w.atoms.velocity(w.at(31)), before);
+        }
+        return;
+      }
+      ++w.run.step;
+      parts.exchange.forget_past_motions();
+      if (const int body = parts.body_of(31)) parts.bed.solid.body(body).shift(Vec3(0.3 * d, 0, 0));
+      const std::vector<std::int64_t> found = parts.handover.stored_elsewhere();
+      EXPECT_EQ(std::count(found.begin(), found.end(), 31), w.ranks.me == 0);
+    });
 }
 
 TEST(Handover, an_interface_granule_that_was_announced_and_does_not_come_has_left_its_body) {
