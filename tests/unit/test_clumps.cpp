@@ -348,6 +348,7 @@ TEST(CalmOfClumps, one_of_which_a_sphere_is_held_stays_free) {
   look_on_one_and_two_ranks([](LookedAtClump& c) {
     if (c.world.at(2) >= 0) c.world.atoms.groups[c.world.at(2)] |= SmallAtoms::held_group;
     c.looks();
+    for (const int tag : {1, 2}) c.expect_calm(tag, 0);
     c.expect_chosen({3, 4});
   });
 }
