@@ -51,9 +51,9 @@ ClumpBed bed_of(const std::string& name) {
 
 constexpr double side = 0.026;
 
-std::string head(const ClumpBed& b) {
+std::string head(const ClumpBed& b, const std::string& cuts = grid()) {
   return std::string("atom_style granular\natom_modify map array\nboundary ") + (b.periodic ? "p p f" : "f f f") +
-         "\nnewton off\ncommunicate single vel yes\nunits si\nprocessors " + grid() + "\n";
+         "\nnewton off\ncommunicate single vel yes\nunits si\nprocessors " + cuts + "\n";
 }
 
 std::string body(const ClumpBed& b) {
@@ -76,15 +76,14 @@ constexpr const char* moved =
     "fix spheres all nve/sphere\nfix clumps all multisphere allow_group_and_set yes\nthermo 100000\nthermo_modify norm no lost "
     "ignore\n";
 
-/// Poured and settled once for all tests of a process.
+/// Poured and settled once for all tests of a process, on one rank: the same for every grid. Collective.
 std::string settled(const ClumpBed& b) {
   static std::set<std::string> made;
   const std::string file = "clumps_" + b.name + ".restart";
-  if (made.count(b.name)) return file;
-  Engine e;
+  if (!made.insert(b.name).second) return file;
   const double rim = b.periodic ? 0 : 0.002;
   std::ostringstream s;
-  s << head(b) << "region reg block " << -rim << ' ' << side + rim << ' ' << -rim << ' ' << side + rim << " -0.002 0.2\n"
+  s << head(b, "1 1 1") << "region reg block " << -rim << ' ' << side + rim << ' ' << -rim << ' ' << side + rim << " -0.002 0.2\n"
     << "create_box 1 reg\nneighbor 0.0006 bin\nneigh_modify delay 0\n"
     << body(b) << b.templates << "fix dist all particledistribution/discrete 32452867 " << b.shares << "\n"
     << "region pour block 0.002 " << side - 0.002 << " 0.002 " << side - 0.002 << " 0.005 0.19\n"
@@ -94,8 +93,10 @@ std::string settled(const ClumpBed& b) {
     << b.granules << "\n"
     << moved << "run 12000\nunfix ins\nfix visc all viscous 0.002\nrun 9000\nunfix visc\nrun 5000\nwrite_restart " << file
     << "\n";
-  e.run(s.str());
-  made.insert(b.name);
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  if (rank == 0) Engine(MPI_COMM_SELF).run(s.str());
+  MPI_Barrier(MPI_COMM_WORLD);
   return file;
 }
 
