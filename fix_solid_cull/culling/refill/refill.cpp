@@ -1,6 +1,7 @@
 #include "refill.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -13,14 +14,35 @@ namespace solidcull {
 namespace {
 
 constexpr int sweeps_alone = 200;
-// ranks show each other what they have packed so many times; in turns they look for room, so that no two find the same
-constexpr int rounds_beside_others = 8, sweeps_in_a_round = 40;
+// ranks show each other what they have packed, so many times for each turn
+constexpr int rounds_of_a_turn = 4, sweeps_in_a_round = 40;
 constexpr double overlap_allowed = 1e-3;  // of the radii's sum: as resting granules have
 constexpr double clear_of_walls = 0.5;    // diameters: nobody asks for walls within so far of a place where none was so near
 // what overlaps by more after that is caught between others: it looks for room elsewhere, so many times at most
 constexpr double caught = 0.03;  // of the radii's sum
 constexpr int new_beginnings = 4, sweeps_again = 60;
 constexpr double longest_way = 4, next_place = 3;  // diameters
+
+/// In turns ranks look for room, so that no two find the same: those that share a border have other turns.
+struct Turns {
+  int count, mine;
+};
+Turns turns(const Bed& bed) {
+  Turns t{1, 0};
+  const std::array<std::vector<double>, 3> cuts = bed.ranks.cuts();
+  const Box own = bed.ranks.own();
+  for (std::size_t d = 0; d < 3; ++d) {
+    const int ranks = static_cast<int>(cuts[d].size()) - 1;
+    if (ranks == 1) continue;
+    const double middle = 0.5 * (own.lo[d] + own.hi[d]);
+    const int at = static_cast<int>(std::upper_bound(cuts[d].begin(), cuts[d].end(), middle) - cuts[d].begin()) - 1;
+    const bool closed_ring = bed.run.periodic[d] && ranks % 2 == 1;  // the last one's neighbours have both turns
+    t.mine += t.count * (closed_ring && at + 1 == ranks ? 2 : at % 2);
+    t.count *= closed_ring ? 3 : 2;
+  }
+  t.count = std::max(t.count, 2);  // one rank beside its own images pauses, too
+  return t;
+}
 
 }  // namespace
 
@@ -74,11 +96,13 @@ bool Refill::pack() {
   newcomers_.insert(newcomers_.end(), came.begin(), came.end());
   std::sort(newcomers_.begin(), newcomers_.end());
   newcomers_.erase(std::unique(newcomers_.begin(), newcomers_.end()), newcomers_.end());
-  if (!bed_.ranks.has_neighbours())
+  if (!bed_.ranks.has_neighbours()) {
     pack(sweeps_alone, true);
-  else
-    for (int round = 0; round < rounds_beside_others; ++round)
-      pack(sweeps_in_a_round, round + 1 < rounds_beside_others && (round + bed_.ranks.me) % 2 == 0);
+    return true;
+  }
+  const Turns t = turns(bed_);
+  const int rounds = rounds_of_a_turn * t.count;
+  for (int round = 0; round < rounds; ++round) pack(sweeps_in_a_round, round + 1 < rounds && round % t.count == t.mine);
   return true;
 }
 
