@@ -20,6 +20,12 @@ def height_map(granules, low, size, cell, ground=0.0):
     return height
 
 
+def crater(before, after, size, cell):
+    """What the surface of a bed has lost and gained (m3)."""
+    change = (height_map(after, (0, 0), size, cell) - height_map(before, (0, 0), size, cell)) * cell**2
+    return float(-change[change < 0].sum()), float(change[change > 0].sum())
+
+
 def rms(a, b):
     """Root mean square of the difference of two maps, where both have a value."""
     return float(np.sqrt(np.nanmean((a - b)**2)))

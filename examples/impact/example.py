@@ -6,32 +6,16 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))
 from solidcull_runs import errors, examples, struck  # noqa: E402
-from solidcull_runs.dumps import read_final  # noqa: E402
-from solidcull_runs.measures import height_map  # noqa: E402
 
 BOX, DEPTH, STRIKER = 0.075, 0.062, 0.005  # m: width of the bed, height shown, larger radii are the ball
 TIME_STEP = 3e-5                           # s
 APART = [k * 1e-5 for k in (0, 1, -1, 2, -2)]  # m: the ball's x in each pair of runs
 METRICS = ("v_depth", "v_depth:max", "v_force:max", "c_bedke:max", "c_bedke:mean", "v_floor:max", "v_floor", "c_path")
-CELL = 0.0005                              # m, of the height map
 SHOWN = 4                                  # moments in the picture
-
-
-def surface(granules):
-    """Height of the bed's surface (m), without the ball."""
-    return height_map(granules[granules["radius"] < STRIKER], (0, 0), (BOX, BOX), CELL)
-
-
-def crater(run, out):
-    """What the strike did to the surface, from the places of all granules at the end."""
-    change = surface(run.final) - surface(read_final(out / f"{run.name}.start"))
-    return {"crater volume": float(-change[change < 0].sum() * CELL**2),
-            "heap volume": float(change[change > 0].sum() * CELL**2)}
-
 
 IMPACT = examples.Example(
     here=HERE, deck="impact.in", bed="settle.in", bed_takes="settling 20,000 granules: one to two minutes",
-    sources=("bed.in", "floor.stl"), granules=20001, steps=8000, wanted=METRICS, figures=crater,
+    sources=("bed.in", "floor.stl"), granules=20001, steps=8000, wanted=METRICS, figures=struck.crater_of(BOX, STRIKER),
     plot=struck.plot_of(TIME_STEP), moments=struck.moments_of(TIME_STEP, SHOWN, BOX / 2, (BOX, BOX, DEPTH), STRIKER),
     files_every=400, vdb_every=4000, vary=("dx", APART), runs=5, at_once=2,
     few={"L": 0.02, "bed_granules": 900, "steps": 700}, few_bed={"L": 0.02, "bed_granules": 900, "dampsteps": 1000, "freesteps": 50},

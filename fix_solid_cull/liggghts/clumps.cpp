@@ -147,6 +147,7 @@ void EngineClumps::put(const Clump& c, int sphere) {
   clumps.prop().popElemFromBuffer(row, LAMMPS_NS::OPERATION_COMM_EXCHANGE, dummy, dummy, dummy);
   const int here = engine::clumps_here(clumps)++;
   engine::rows_of_clumps(clumps)[c.number] = here;
+  if (static_cast<int>(c.rest.size()) >= rest_size) return;
   for_each_column([&](LAMMPS_NS::ContainerBase& column, int place, int) {
     if (place >= static_cast<int>(c.rest.size())) column.setToDefault(here);
   });

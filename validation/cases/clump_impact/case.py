@@ -1,7 +1,5 @@
 """The strike of examples/clumps, in two beds of clumps."""
-import numpy as np
-
-from solidcull_runs import measures, meshes
+from solidcull_runs import meshes, struck
 
 deck, bed = "../../../examples/clumps/strike.in", "../../../examples/clumps/settle.in"
 bed_uses = ("clumps", "L", "wide")
@@ -13,7 +11,6 @@ aside = "dx"
 paper = False  # it keeps no clumps
 curves = {"largest depth": "v_depth", "mean kinetic energy": "v_bedke", "peak load on the floor": "v_floor"}
 picture = ("y", 0.5, 0.004)
-CELL = 5e-4  # m, of the height map
 
 
 def files(folder, v):
@@ -21,11 +18,4 @@ def files(folder, v):
 
 
 def measure(run, v):
-    depth, force, energy, floor = (run.series(c)[1] for c in ("v_depth", "v_force", "v_bedke", "v_floor"))
-    after, before = (measures.height_map(g[g["radius"] < 0.004], (0, 0), (v["L"], v["L"]), CELL) for g in (run.final, run.start))
-    change = (after - before) * CELL**2
-    way = np.sqrt(sum((run.final[c] - run.start[c])**2 for c in "xyz"))[run.final["radius"] < 0.004]
-    return {"largest depth": depth.max(), "depth at the end": depth[-1], "peak force on the ball": force.max(),
-            "mean kinetic energy": energy.mean(), "peak kinetic energy": energy.max(), "peak load on the floor": floor.max(),
-            "load on the floor at the end": floor[-1], "sum of displacements": way.sum(), "crater": -change[change < 0].sum(),
-            "heap": change[change > 0].sum()}
+    return struck.metrics_of(run, v["L"], 0.004, "v_bedke")

@@ -23,10 +23,9 @@ def measure(run, v):
     t, depth, force, floor = (run.series(c)[1] for c in ("time", "v_depth", "v_force", "v_floor"))
     stopped = np.argmax(depth >= 0.95 * depth.max())
     bed, start = (g[g["radius"] < 0.004] for g in (run.final, run.start))
-    cell, size = 5e-4, (v["L"], v["W"])
-    change = measures.height_map(bed, (0, 0), size, cell) - measures.height_map(start, (0, 0), size, cell)
+    lost, _ = measures.crater(start, bed, (v["L"], v["W"]), 5e-4)
     return {"depth": depth.max(), "stopping time": t[stopped] - t[0], "peak force on the ball": force.max(),
-            "peak rise of the floor's load": floor.max() - floor[0], "crater": -change[change < 0].sum() * cell**2}
+            "peak rise of the floor's load": floor.max() - floor[0], "crater": lost}
 
 
 def laws(values):
