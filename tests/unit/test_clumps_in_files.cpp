@@ -5,24 +5,18 @@
 #include <string>
 
 #include "clump_bundle.h"
+#include "section_file.h"
 
 namespace solidcull {
 namespace {
 
 /// The engine's side of a restart file: atoms, with what follows them, and the clumps that it moves; and the culling's.
-struct FileWithClumps {
-  std::mutex mutex;
+struct FileWithClumps : SectionFile {
   struct Atom {
     std::vector<double> record, followers;
   };
   std::vector<Atom> atoms;
   std::vector<Clump> clumps;
-  std::vector<double> state;  // in its head
-  std::string end = ::testing::TempDir() + "solidcull-clumps-" + std::to_string(reinterpret_cast<std::uintptr_t>(this));
-
-  FileWithClumps() { std::remove(end.c_str()); }
-  ~FileWithClumps() { std::remove(end.c_str()); }
-  FileWithClumps(const FileWithClumps&) = delete;
 
   void write(SmallWorld& w, WorldParts& parts) {
     const std::vector<double> numbers = parts.snapshot.write(false);

@@ -10,6 +10,7 @@
 #include <type_traits>
 
 #include "input_error.h"
+#include "section_file.h"
 #include "tag_owners.h"
 #include "world_parts.h"
 
@@ -325,19 +326,12 @@ TEST(Handover, an_interface_granule_that_comes_without_its_body_is_an_internal_e
 // ------------------------------------------------------------------------------------------------------------ snapshot
 
 /// The engine's side of a restart file: atoms, with what follows them.
-struct File {
-  std::mutex mutex;
+struct File : SectionFile {
   struct Atom {
     std::vector<double> record;
     std::vector<std::vector<double>> followers;
   };
   std::vector<Atom> atoms;
-  std::vector<double> state;  // in its head
-  std::string end = ::testing::TempDir() + "solidcull-section-" + std::to_string(reinterpret_cast<std::uintptr_t>(this));
-
-  File() { std::remove(end.c_str()); }
-  ~File() { std::remove(end.c_str()); }
-  File(const File&) = delete;
 
   void write(SmallWorld& w, WorldParts& parts) {
     const std::vector<double> numbers = parts.snapshot.write(false);
