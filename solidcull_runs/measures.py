@@ -20,9 +20,11 @@ def height_map(granules, low, size, cell, ground=0.0):
     return height
 
 
-def crater(before, after, size, cell):
-    """What the surface of a bed has lost and gained (m3)."""
+def crater(before, after, size, cell, within=np.inf):
+    """What the surface of a bed has lost and gained (m3), as far as `within` (m) from the middle."""
     change = (height_map(after, (0, 0), size, cell) - height_map(before, (0, 0), size, cell)) * cell**2
+    x, y = ((np.arange(n) + 0.5) * cell - width / 2 for n, width in zip(change.shape, size))
+    change = change[np.hypot(x[:, None], y) < within]
     return float(-change[change < 0].sum()), float(change[change > 0].sum())
 
 

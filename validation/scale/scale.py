@@ -32,7 +32,7 @@ import culled_files  # noqa: E402
 import lay_culled  # noqa: E402
 import published  # noqa: E402
 import tiles  # noqa: E402
-from solidcull_runs import beds, comparisons, decks, engine, errors, examples, logs, plots, tables  # noqa: E402
+from solidcull_runs import beds, comparisons, decks, engine, errors, examples, logs, measures, plots, struck, tables  # noqa: E402
 from solidcull_runs.dumps import element_normal_loads, read_final  # noqa: E402
 from solidcull_runs.meshes import grid, stl_text  # noqa: E402
 
@@ -226,10 +226,8 @@ def window(granules, sides):
 
 def crater(before, after, sides, within=np.inf):
     """Volume (m^3) that the surface around the middle, as far as `within` (m), has lost and gained."""
-    change = impact.surface(window(after, sides)) - impact.surface(window(before, sides))
-    place = (np.arange(len(change)) + 0.5) * impact.CELL - impact.BOX / 2
-    change = change[np.hypot(place[:, None], place) < within]
-    return float(-change[change < 0].sum() * impact.CELL**2), float(change[change > 0].sum() * impact.CELL**2)
+    near = (struck.bed_of(window(granules, sides), impact.STRIKER) for granules in (before, after))
+    return measures.crater(*near, (impact.BOX, impact.BOX), struck.CELL, within)
 
 
 def figures_of(scene, kind, text, made_bed, final, loads):
