@@ -337,6 +337,13 @@ class FileRefusals(Case):
                                   f"keyword 'bed': cannot write missing/bed.*.vtp: {self.REASON}")
         self.assertNotIn("Step", run.log)
 
+    def test_a_restart_file_that_is_not_there_is_named(self):
+        text = "atom_style granular\nread_restart nowhere.restart\n"
+        for ranks in (1, 2):
+            run = Run(text, ranks=ranks)
+            self.assertEqual(run.errors(run.screen), ["ERROR on proc 0: Cannot open restart file nowhere.restart"])
+            self.assertNotEqual(run.status, 0)
+
     def test_files_that_can_be_written_are(self):
         run = self.accepted(BLOCK + CULL_BLOCK + " bed 100 bed.*.vtp mesh 100 mesh.*.vdb\nrun 200\n")
         for name in ("bed.0.vtp", "bed.100.vtp", "bed.200.vtp", "mesh.0.vdb", "mesh.100.vdb", "mesh.200.vdb"):

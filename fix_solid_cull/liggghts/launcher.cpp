@@ -44,6 +44,13 @@ bool asks_for_version(int argc, char** argv) {
 
 }  // namespace
 
+/// LIGGGHTS ends here where one rank alone has an error: what it wrote to screen and log, why above all on screen, is
+/// not lost with it.
+extern "C" int MPI_Abort(MPI_Comm ranks, int status) {
+  fflush(nullptr);
+  return PMPI_Abort(ranks, status);
+}
+
 int main(int argc, char** argv) {
   if (asks_for_version(argc, argv)) {
     printf("solidcull %s\n", solidcull_version());

@@ -76,11 +76,10 @@ constexpr const char* moved =
     "fix spheres all nve/sphere\nfix clumps all multisphere allow_group_and_set yes\nthermo 100000\nthermo_modify norm no lost "
     "ignore\n";
 
-/// Poured and settled once for all tests of a process, on one rank: the same for every grid. Collective.
+/// Poured and settled. Collective.
 std::string settled(const ClumpBed& b) {
-  static std::set<std::string> made;
   const std::string file = "clumps_" + b.name + ".restart";
-  if (!made.insert(b.name).second) return file;
+  if (!first_asked_for(file)) return file;
   const double rim = b.periodic ? 0 : 0.002;
   std::ostringstream s;
   s << head(b, "1 1 1") << "region reg block " << -rim << ' ' << side + rim << ' ' << -rim << ' ' << side + rim << " -0.002 0.2\n"
@@ -91,12 +90,8 @@ std::string settled(const ClumpBed& b) {
        "yes "
        "orientation random vel constant 0 0 -0.5 region pour ntry_mc 10000 particles_in_region "
     << b.granules << "\n"
-    << moved << "run 12000\nunfix ins\nfix visc all viscous 0.002\nrun 9000\nunfix visc\nrun 5000\nwrite_restart " << file
-    << "\n";
-  int rank = 0;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  if (rank == 0) Engine(MPI_COMM_SELF).run(s.str());
-  MPI_Barrier(MPI_COMM_WORLD);
+    << moved << "run 12000\nunfix ins\nfix visc all viscous 0.002\nrun 9000\nunfix visc\nrun 5000\n";
+  make_bed(file, s.str());
   return file;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <set>
 #include <sstream>
@@ -289,26 +290,39 @@ std::string pouring(const Bed& bed, const std::string& cuts) {
   return s.str();
 }
 
+bool first_asked_for(const std::string& file) {
+  static std::set<std::string> all;
+  return all.insert(file).second;
+}
+
+void make_bed(const std::string& file, const std::string& deck) {
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  if (rank == 0 && !(std::getenv("SOLIDCULL_KEEP_BEDS") && std::filesystem::exists(file))) {
+    const std::string unfinished = "making_" + file;
+    Engine(MPI_COMM_SELF).run(deck + "write_restart " + unfinished + "\n");
+    std::filesystem::rename(unfinished, file);
+  }
+  MPI_Barrier(MPI_COMM_WORLD);
+}
+
 std::string settled(const Bed& bed) {
-  static std::set<std::string> made;
   const std::string file = "bed_" + bed.name + ".restart";
-  if (!made.insert(bed.name).second) return file;
+  if (!first_asked_for(file)) return file;
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   if (rank == 0) {
     write_floor(bed.name + "_floor.stl", bed.side);
     write_side(bed.name + "_side.stl", bed.side);
-    const auto steps = [&](double at_3e5) { return static_cast<int>(std::lround(at_3e5 * 3e-5 / bed.dt)); };
-    std::ostringstream s;
-    s << pouring(bed, "1 1 1") << "run " << steps(4000) << "\nunfix ins\n"
-      << "fix visc all viscous 0.002\nrun " << steps(6000) << "\n";
-    // spin about a lone contact has no damping in most models: stopped by hand, until the bed is at rest
-    for (int k = 0; k < 8; ++k)
-      s << "set group all omegax 0 omegay 0 omegaz 0\nvelocity all set 0 0 0\nrun " << steps(700) << "\n";
-    s << "unfix visc\nwrite_restart " << file << "\n";
-    Engine(MPI_COMM_SELF).run(s.str());
   }
-  MPI_Barrier(MPI_COMM_WORLD);
+  const auto steps = [&](double at_3e5) { return static_cast<int>(std::lround(at_3e5 * 3e-5 / bed.dt)); };
+  std::ostringstream s;
+  s << pouring(bed, "1 1 1") << "run " << steps(4000) << "\nunfix ins\n"
+    << "fix visc all viscous 0.002\nrun " << steps(6000) << "\n";
+  // spin about a lone contact has no damping in most models: stopped by hand, until the bed is at rest
+  for (int k = 0; k < 8; ++k) s << "set group all omegax 0 omegay 0 omegaz 0\nvelocity all set 0 0 0\nrun " << steps(700) << "\n";
+  s << "unfix visc\n";
+  make_bed(file, s.str());
   return file;
 }
 

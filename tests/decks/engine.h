@@ -96,8 +96,12 @@ extern const char* const rain_of_64;
 /// Lets them fall for 3,000 steps, and expects that none is lost, here and in the store of the fix `cull`. How many there are.
 /// Collective.
 std::size_t rain_on(Engine& e, const Bed& bed);
-/// Pours and settles the bed once for all tests of a process, on one rank, so that it is the same whatever the grid; returns the
-/// restart file's name. Collective.
+/// True once a process: beds are made once for all its tests.
+bool first_asked_for(const std::string& file);
+/// Runs the deck on one rank, so that a bed is the same whatever the grid, and writes its restart file. One that is there is
+/// taken where SOLIDCULL_KEEP_BEDS is in the environment (grids.sh). Collective.
+void make_bed(const std::string& file, const std::string& deck);
+/// The bed's restart file, poured and settled. Collective.
 std::string settled(const Bed& bed);
 
 }  // namespace decks
