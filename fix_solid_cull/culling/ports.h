@@ -163,7 +163,7 @@ class Clumps {
   virtual Clump take(int number) = 0;
   /// It moves it again, with these spheres on any rank; atom `sphere`, which is here, says which periodic image it is in.
   virtual void put(const Clump& clump, int sphere) = 0;
-  /// Owned atom i is a sphere of this clump from here on; 0: a granule of its own.
+  /// Atom i is a sphere of this clump from here on; 0: a granule of its own. Its ghosts do not hear of it.
   virtual void set_clump(int i, int number) = 0;
   /// Owned atom i is in the periodic image in which it is nearest to owned atom `to`, a sphere of the same clump.
   virtual void join_image(int i, int to) = 0;

@@ -80,6 +80,7 @@ void FixSolidCull::publish_flags() {
   restart_global = 1;
   restart_peratom = 1;
   create_attribute = 1;
+  comm_forward = 1;
 }
 
 int FixSolidCull::setmask() {
@@ -254,6 +255,19 @@ void FixSolidCull::lend_contacts() {
 
 void FixSolidCull::take_contacts_back() {
   hand_on([&] { culling_->take_contacts_back(); });
+}
+
+void FixSolidCull::tell_ghosts_their_clumps() {
+  if (clumps_.possible) comm->forward_comm_fix(this);
+}
+
+int FixSolidCull::pack_comm(int n, int* atoms, double* buffer, int, int*) {
+  for (int k = 0; k < n; ++k) buffer[k] = clumps_.of(atoms[k]);
+  return 1;
+}
+
+void FixSolidCull::unpack_comm(int n, int first, double* buffer) {
+  for (int k = 0; k < n; ++k) clumps_.set_clump(first + k, static_cast<int>(buffer[k]));
 }
 
 void FixSolidCull::granules_may_change() {

@@ -57,6 +57,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void set_arrays(int i) override;
   int pack_exchange(int i, double* buffer) override;
   int unpack_exchange(int i, double* buffer) override;
+  int pack_comm(int n, int* atoms, double* buffer, int, int*) override;
+  void unpack_comm(int n, int first, double* buffer) override;
   int pack_restart(int i, double* buffer) override;
   void unpack_restart(int i, int nth) override;
   int size_restart(int) override { return maxsize_restart(); }
@@ -80,6 +82,8 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   /// The engine computes forces of all granules between these two.
   void lend_contacts();
   void take_contacts_back();
+  /// Ghosts learn which clumps they are of, as fix multisphere tells them at the builds of a run.
+  void tell_ghosts_their_clumps();
   bool culls_of(int groups);
   void granules_may_change();
   /// A program may change them between these two. Local.

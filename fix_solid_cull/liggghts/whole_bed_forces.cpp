@@ -103,6 +103,7 @@ void WholeBedForces::list_pairs() {
   if (atom->map_style) atom->map_clear();
   atom->nghost = 0;
   comm->borders();
+  fix_.tell_ghosts_their_clumps();  // pairs within a clump have no contact
   neighbor->build();
 }
 
