@@ -46,7 +46,7 @@ class Atoms {
   int* groups = nullptr;  ///< bits of the groups that an atom is in
   int interface_bit = 0;  ///< the group of interface granules
   int own_bit = 0;        ///< the fix's own group
-  int movable_bits = 0;   ///< groups that an integrator moves
+  int movable_bits = 0;   ///< groups whose spheres an integrator moves, each by itself
   int held_bits = 0;      ///< groups that something holds or drives: never culled
   int gravity_bits = 0;   ///< groups that gravity pulls, each by a fix of its own; 0: there is no gravity
 
@@ -77,10 +77,10 @@ class Atoms {
   Ways ways;
 
   /// An integrator moves it, all the gravity there is pulls it, and nothing else holds or drives it. Clumps are moved whatever
-  /// their groups.
-  bool may_be_culled(int i) const { return groups_may_be_culled(groups[i]) && !ways.hold(i); }
-  bool groups_may_be_culled(int g) const {
-    return (g & own_bit) && (g & movable_bits) && !(g & held_bits) && (g & gravity_bits) == gravity_bits;
+  /// their groups; what moves them moves nothing else.
+  bool may_be_culled(int i, bool of_clump) const { return groups_may_be_culled(groups[i], of_clump) && !ways.hold(i); }
+  bool groups_may_be_culled(int g, bool of_clump) const {
+    return (g & own_bit) && (of_clump || (g & movable_bits)) && !(g & held_bits) && (g & gravity_bits) == gravity_bits;
   }
 
   /// Everything that the engine keeps of owned granule i, as doubles; `layout`: the number of its columns' layout.

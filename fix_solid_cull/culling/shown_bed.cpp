@@ -75,7 +75,7 @@ void ShownBed::show_interface() {
       atoms.set_velocity(i, e.velocity);
       if (bed_.contacts.turn_granules) atoms.set_spin(i, e.spin);
     }
-    note(i, false, 0);
+    note(i, false, e.clump, 0);
     if (e.clump == 0) continue;
     bed_.clumps.set_clump(i, e.clump);
     if (const Clump* c = bed_.locked_clumps.find(atoms.tag[i]))
@@ -99,17 +99,17 @@ void ShownBed::show_stored() {
       if (bed_.contacts.turn_granules) atoms.set_spin(i, body.twist.spin);
     }
     bed_.shell.label(i, bed_.groups.key_of(g.body));
-    note(i, true, sum_of(record));
+    note(i, true, g.clump, sum_of(record));
     atoms.mark_interface(i, false);
     if (g.clump) spheres_.emplace_back(i, g.clump);
     if (g.has_clump) show_clump(i, g.tag, StoreExchange::clump_of(record, g), g.body, transient_known);
   });
 }
 
-void ShownBed::note(int i, bool stored, std::uint64_t sum) {
+void ShownBed::note(int i, bool stored, bool of_clump, std::uint64_t sum) {
   const Atoms& atoms = bed_.atoms;
   names_[static_cast<std::size_t>(i)] = {bed_.ranks.me, static_cast<std::int32_t>(granules_.size())};
-  granules_.push_back({atoms.tag[i], stored, false, atoms.place(i), atoms.velocity(i), atoms.spin(i), atoms.radius[i],
+  granules_.push_back({atoms.tag[i], stored, of_clump, false, atoms.place(i), atoms.velocity(i), atoms.spin(i), atoms.radius[i],
                        atoms.mass[i], atoms.type[i], sum});
 }
 
@@ -305,7 +305,7 @@ void ShownBed::judge(std::size_t number, int i) {
     throw InternalError("granule " + std::to_string(s.tag) + " was renumbered as " + std::to_string(atoms.tag[i]));
   // what walls and cover knew of an interface granule does not come back with it from another rank
   const bool changed = !is_as_shown(s, i) || (s.has_been_away && !s.stored);
-  if (changed || !atoms.may_be_culled(i)) wakes();  // or the deck holds or drives it from now on
+  if (changed || !atoms.may_be_culled(i, s.of_clump)) wakes();  // or the deck holds or drives it from now on
   if (s.stored) {
     groups_of_guests_ |= atoms.groups[i];
     atoms.mark_interface(i, true);  // as it went into the store

@@ -57,8 +57,8 @@ class ShownBed : public FollowsAtoms {
   };
   struct Shown {
     std::int64_t tag;
-    bool stored, has_been_away;  // has_been_away: on another rank
-    Vec3 place, velocity, spin;  // as shown
+    bool stored, of_clump, has_been_away;  // has_been_away: on another rank
+    Vec3 place, velocity, spin;            // as shown
     double radius, mass;
     int type;
     std::uint64_t sum;  // of all its numbers but those of its motion, as shown
@@ -83,7 +83,7 @@ class ShownBed : public FollowsAtoms {
   void take_clumps(const std::vector<int>& at);
   void show_interface();
   void show_stored();
-  void note(int i, bool stored, std::uint64_t sum);
+  void note(int i, bool stored, bool of_clump, std::uint64_t sum);
   static KnownContacts contacts_of(const HistoryRows& rows, int i, std::int64_t tag);
   KnownContacts contacts_in_body(std::int64_t tag, bool stored, int body) const;
   void give(int i, const KnownContacts& contacts);

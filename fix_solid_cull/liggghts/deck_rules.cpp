@@ -11,6 +11,7 @@
 #include "domain.h"
 #include "engine_access.h"
 #include "fix_insert_pack.h"
+#include "fix_multisphere.h"
 #include "fix_styles.h"
 #include "force.h"
 #include "input_error.h"
@@ -134,7 +135,8 @@ bool DeckRules::find_movable(EngineAtoms& atoms, const Run& run) {
     if (std::strcmp(fix->style, own_->style) == 0) continue;
     if (std::strcmp(fix->style, "gravity") == 0) atoms.gravity_bits |= fix->groupbit;
     const FixStyle& style = treatment_of(fix->style);
-    if (style.treatment == Treatment::integrates) atoms.movable_bits |= fix->groupbit;
+    const bool moves_clumps_alone = dynamic_cast<const LAMMPS_NS::FixMultisphere*>(fix) != nullptr;
+    if (style.treatment == Treatment::integrates && !moves_clumps_alone) atoms.movable_bits |= fix->groupbit;
     if (style.treatment == Treatment::holds || style.treatment == Treatment::drives) atoms.held_bits |= fix->groupbit;
     if (style.treatment == Treatment::drives)
       say_once(run, named(fix) + " " + style.why + ": granules of its group are not culled");

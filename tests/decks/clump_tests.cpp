@@ -396,6 +396,28 @@ TEST(ClumpsInDecks, GetTheColumnsOfFixesThatComeLater) {
   }
 }
 
+/// Spheres that are of no clump are not moved by fix multisphere: without an integrator of their own they stay where they are.
+TEST(ClumpsInDecks, LeaveSpheresAloneThatNothingMoves) {
+  std::string deck = read(bed_of("mixed"));
+  const std::string integrator = "fix spheres all nve/sphere\n";
+  deck.erase(deck.find(integrator), integrator.size());
+  Engine stock, culled;
+  stock.run(deck + "run 600\n");
+  culled.run(deck + asleep + "run 600\n");
+  EXPECT_GT(culled.vector("cull", 2) + culled.vector("cull", 3), 100) << "no clump was culled: the test shows nothing";
+  for (Engine* e : {&stock, &culled}) e->run("unfix z1\nrun 500\n");
+  culled.run("unfix cull\n");
+  const State all = stock.state(), back = culled.state();
+  expect_same_granules(all, back);
+  std::size_t spheres = 0;
+  for (const auto& [tag, g] : all) {
+    if (g.clump) continue;
+    ++spheres;
+    EXPECT_EQ(back.at(tag).x, g.x) << tag;
+  }
+  EXPECT_GT(spheres, 50u);
+}
+
 /// Contacts that a formula counts between runs: none within a clump, be it across a border. Those of clumps across a periodic
 /// side are known where one rank has both sides.
 TEST(ClumpsInDecks, HaveNoContactsWithinBetweenRuns) {

@@ -41,11 +41,12 @@ class MoreEvents:
     def contacts(self):
         """A sum over contacts that the deck prints at the end of a run, and goes by."""
         rng, c = self.rng, self.name("sum")
-        how = rng.choice(("contact/atom", "stress/atom virial", self.local))
+        stress = "stress/atom pair" if self.clumps else "stress/atom virial"  # what holds clumps together is in no virial between runs
+        how = rng.choice(("contact/atom", stress, self.local))
         if not how:  # no such list
             return
         lines, kind, what = {"contact/atom": ([f"compute {c}a all contact/atom", f"compute {c} all reduce sum c_{c}a"], "contacts", f"c_{c}"),
-                             "stress/atom virial": ([f"compute {c}a all stress/atom virial", f"compute {c} all reduce sum c_{c}a[1] c_{c}a[2] c_{c}a[3]"], "load", f"c_{c}[3]")}.get(how, ([], "load", "c_overlap"))
+                             stress: ([f"compute {c}a all {stress}", f"compute {c} all reduce sum c_{c}a[1] c_{c}a[2] c_{c}a[3]"], "load", f"c_{c}[3]")}.get(how, ([], "load", "c_overlap"))
         column = f"v_{c}" if rng.random() < 0.5 else what
         self.say(*lines, f"variable {c} equal {what}", f"thermo_style custom step atoms ke c_ke {column}", f"run {rng.choice((20, 50, 100))}",
                  f'print "CHECK {c} {kind} ${{{c}}}"', f'if "${{{c}}} > 100" then "print much" else "print little"', "thermo_style custom step atoms ke c_ke")
