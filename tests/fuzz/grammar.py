@@ -43,7 +43,7 @@ class Grammar(MoreEvents):
         self.library = self.more and (self.chance(0.2) if library is None else library)
         self.streaming = self.pair_changed = False
         self.traits, self.parts, self.files, self.names = set(), [], [], 0
-        self.culling, self.checks, self.groups, self.exact_groups = False, 0, [], ["all"]
+        self.culling, self.balanced, self.checks, self.groups, self.exact_groups = False, False, 0, [], ["all"]
         self.meshes, self.inserting, self.held = [], None, []
 
     # --- helpers
@@ -253,6 +253,8 @@ class Grammar(MoreEvents):
             words = words.replace("region", "orientation random region") + " ntry_mc 10000"
         if how == "pack":
             self.say(f"fix ins all insert/pack seed 32452867 {common} insert_every once {words} particles_in_region {n}", needed=True)
+            if self.clumps and self.balanced and self.slow:  # each rank draws its own share of the kinds
+                self.traits.add("loose")
         else:
             self.say(f"fix ins all insert/rate/region seed 32452867 {common} nparticles {n} particlerate {n * 50} "
                      f"insert_every {rng.choice((100, 300))} {words}", needed=True)
@@ -285,8 +287,9 @@ class Grammar(MoreEvents):
         return [f"balance {rng.choice((10, 50, 100))} {rng.choice((1.05, 1.2, 2))}"] if rng.random() < 0.5 else []
 
     def cull(self):
-        self.parts.append(CullLine([], needed=True, keywords=self.keywords() + self.balance()))
-        self.culling = True
+        balance = self.balance()
+        self.parts.append(CullLine([], needed=True, keywords=self.keywords() + balance))
+        self.culling, self.balanced = True, bool(balance)
 
     # --- what happens then
 
