@@ -24,11 +24,12 @@ for grid; do
     code=0
     SOLIDCULL_GRID=$grid timeout "${LIMIT:-1200}" mpirun -np "$ranks" -x LD_PRELOAD="$build/libnaps.so" ../deck_tests \
       --gtest_filter="$suite" --gtest_color=no >"$said" 2>&1 || code=$?
-    failed=$(grep -a '^\[  FAILED  \].* ms)' "$said" | sort -u || true)
-    echo "$grid  $suite  $(grep -ac '^\[       OK \]' "$said" || true) passed, $(grep -c . <<<"$failed" || true) failed, $SECONDS s"
+    # the engine's own lines may stand before, on the same line
+    failed=$(grep -ao '\[  FAILED  \].* ms)' "$said" | sort -u || true)
+    echo "$grid  $suite  $(grep -ac '\[       OK \]' "$said" || true) passed, $(grep -c . <<<"$failed" || true) failed, $SECONDS s"
     [ -z "$failed" ] || echo "$failed"
     if [ $code -eq 124 ]; then
-      echo "    no end in ${LIMIT:-1200} s: $(grep -a '^\[ RUN ' "$said" | tail -1)"
+      echo "    no end in ${LIMIT:-1200} s: $(grep -ao '\[ RUN .*' "$said" | tail -1)"
     elif [ $code -gt 1 ]; then
       echo "    status $code: $(grep -a ERROR deck_tests.screen "$said" | tail -1)"
     fi
