@@ -252,7 +252,7 @@ Awake Survey::see(int i, const Seen& seen, const SolidStateLaw& law) {
   const Vec3 v = atoms.velocity(i);
   // a granule that touches nothing but a wall that stands still is one with it where it stays: not where it rolls or slides
   const bool leaves_wall = !seen.touching[i] && wall.stands && std::max(v.norm(), wall.slip) >= law.speed;
-  if (!atoms.may_be_culled(i, bed_.clumps.of(i) || bed_.shell[i].clump)) return Awake::held;
+  if (!atoms.may_be_culled(i, bed_.clumps.of(i))) return Awake::held;
   if (!(seen.touching[i] || at_wall) || !(loaded || !seen.drifting[i])) return Awake::alone;
   if (seen.moving[i] || leaves_wall) return Awake::moving;
   const Vec3 frame = frame_of(i, seen);
