@@ -264,7 +264,7 @@ class Validation(Scripts):
         for old in few.glob("*.json"):
             old.unlink()
         self.run_script(few.parents[1] / "no_harm.py")
-        for scene in ("drum", "mixer", "gas", "silo", "shake", "column", "switch"):
+        for scene in ("drum", "mixer", "gas", "silo", "shake", "column", "switch", "tilt"):
             for mode in ("sleep", "live"):
                 with self.subTest(scene=scene, mode=mode):
                     result = json.loads((few / f"{scene}-300-{mode}.json").read_text())
