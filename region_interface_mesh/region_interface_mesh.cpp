@@ -1,6 +1,7 @@
 #include "region_interface_mesh.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -62,17 +63,23 @@ void RegInterfaceMesh::shape_update() {
   }
 }
 
-/// Bodies hang together through periodic sides: the place counts in all of its images.
+/// Bodies hang together through periodic sides, some over several periods: the place counts in all of its images.
 double RegInterfaceMesh::distance(const Vec3& p, const InterfaceMesh*& nearest, Vec3& image) {
   if (source_.expired()) shape_update();  // the engine asks for that once in a time step only, and fixes go between runs
   double least = HUGE_VAL;
   nearest = nullptr;
-  const int* const periodic = domain->periodicity;
-  for (const Reach& r : reach_)
-    for (int i = -periodic[0]; i <= periodic[0]; ++i)
-      for (int j = -periodic[1]; j <= periodic[1]; ++j)
-        for (int k = -periodic[2]; k <= periodic[2]; ++k) {
-          const Vec3 x = p + Vec3(i * domain->xprd, j * domain->yprd, k * domain->zprd);
+  const Vec3 edges(domain->xprd, domain->yprd, domain->zprd);
+  for (const Reach& r : reach_) {
+    std::array<int, 3> first{}, last{};
+    for (int d = 0; d < 3; ++d) {
+      if (!domain->periodicity[d]) continue;
+      first[d] = static_cast<int>(std::ceil((r.lo[d] - p[d]) / edges[d]));
+      last[d] = static_cast<int>(std::floor((r.hi[d] - p[d]) / edges[d]));
+    }
+    for (int i = first[0]; i <= last[0]; ++i)
+      for (int j = first[1]; j <= last[1]; ++j)
+        for (int k = first[2]; k <= last[2]; ++k) {
+          const Vec3 x = p + Vec3(i, j, k).cwiseProduct(edges);
           if ((x.array() < r.lo.array()).any() || (x.array() > r.hi.array()).any()) continue;
           const double d = r.mesh->signed_distance(x);
           if (d >= least) continue;
@@ -80,6 +87,7 @@ double RegInterfaceMesh::distance(const Vec3& p, const InterfaceMesh*& nearest, 
           nearest = r.mesh;
           image = x;
         }
+  }
   return least;
 }
 
