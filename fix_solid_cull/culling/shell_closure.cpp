@@ -8,8 +8,8 @@
 namespace solidcull {
 namespace {
 
-// an exterior granule that nothing stored was so near to need not be looked at again until it has moved by this many skins: it
-// may have gone as far the other way when the last went to the store, so twice this and one skin is the gap
+// an exterior granule that nothing stored was near to need not be looked at again until it has moved by this many skins: it may
+// have gone as far the other way when the last went to the store, so twice this and one skin is the gap
 constexpr double clear_way_in_skins = 0.75;
 // so many moving frames are compared with a granule one by one, more as one box
 constexpr std::size_t few_frames = 8;
@@ -56,7 +56,7 @@ ShellClosure::Overlapped ShellClosure::by_new_granules() const {
   const Atoms& atoms = bed_.atoms;
   std::vector<Row> rows;
   for (int i = 0; some_made_ && i < atoms.owned; ++i)
-    if (rows_[i].made) rows.push_back({triple(atoms.place(i)), atoms.radius[i], atoms.tag[i]});
+    if (rows_[i].version == Cleared::made) rows.push_back({triple(atoms.place(i)), atoms.radius[i], atoms.tag[i]});
   const std::vector<Row> others = bed_.ranks.exchange(rows, contact_reach(bed_) + bed_.stored.slack());
   rows.insert(rows.end(), others.begin(), others.end());
   std::vector<Sphere> made;
@@ -81,13 +81,14 @@ ShellClosure::Overlapped ShellClosure::by_new_granules() const {
 void ShellClosure::forget_new() {
   if (!some_made_) return;
   some_made_ = false;
-  for (int i = 0; i < bed_.atoms.owned; ++i) rows_[i].made = false;
+  for (int i = 0; i < bed_.atoms.owned; ++i)
+    if (rows_[i].version == Cleared::made) rows_[i].version = Cleared::never;
 }
 
-/// Nothing that is stored in a frame that stands was within store_gap_in_skins of it when it was last looked at; since then it
-/// has hardly moved, and only what is as far from all exterior granules went to the store.
+/// Since it was last looked at it has moved less than would bring it near to what was stored then, in frames that stand, and only
+/// what is farther than store_gap_in_skins from all exterior granules went to the store.
 bool ShellClosure::is_clear(int i) const {
-  const double way = clear_way_in_skins * bed_.run.skin;
+  const double way = rows_[i].way;
   return rows_[i].version == bed_.solid.standing_version() && (bed_.atoms.place(i) - rows_[i].at).squaredNorm() < way * way;
 }
 
@@ -160,17 +161,18 @@ class ShellClosure::Frames {
 /// Exterior granules, and the shells of other bodies, that may be near something stored.
 std::vector<ShellClosure::Visitor> ShellClosure::visitors(const Frames& frames) const {
   std::vector<Visitor> visitors;
+  const double gap = store_gap_in_skins * bed_.run.skin;
   const auto comes = [&](const Visitor& v) {
     if (!(v.who.stands || v.clear) || frames.near_moving(v.who.sphere)) visitors.push_back(v);
   };
   for (const Foreign& f : foreign_)
-    if (!frames.far_from_all(f.sphere.centre, f.sphere.radius)) comes({f, -1, false});
+    if (!frames.far_from_all(f.sphere.centre, f.sphere.radius)) comes({f, -1, false, gap});
   for (int i = 0; i < bed_.atoms.owned; ++i) {
     const bool locked = bed_.shell[i].locked, clear = !locked && is_clear(i);
     if ((locked && !bed_.census.several_bodies()) || (clear && frames.none_moves()) ||
         frames.far_from_all(bed_.atoms.place(i), bed_.atoms.radius[i]))
       continue;
-    comes({as_foreign(i), locked ? -1 : i, clear});
+    comes({as_foreign(i), locked ? -1 : i, clear, gap});
   }
   return visitors;
 }
@@ -192,15 +194,19 @@ void ShellClosure::find_near_granules(std::set<std::int64_t>& near) {
         const Vec3 at = f.pose->to_frame(s.centre + shift);
         bed_.solid.store().for_each_near(f.number, {at, s.radius}, gap, [&](const Resident& g) {
           if (v.who.body && bed_.groups.key_of(g.body) == v.who.body) return;  // in the frame that bodies share
-          const double reach = s.radius + g.radius + skin;
-          if ((g.position - at).squaredNorm() < reach * reach) near.insert(g.tag);
-          if (f.stands) v.atom = -1;
+          const double between = (g.position - at).norm() - s.radius - g.radius;
+          if (between < skin)
+            near.insert(g.tag);
+          else if (f.stands)
+            v.nearest = std::min(v.nearest, between);
         });
         return true;
       });
   }
   for (const Visitor& v : all)
-    if (v.atom >= 0 && !v.clear) rows_[v.atom] = {bed_.solid.standing_version(), false, v.who.sphere.centre};
+    if (v.atom >= 0 && !v.clear)
+      rows_[v.atom] = {bed_.solid.standing_version(), static_cast<float>(std::min(clear_way_in_skins * skin, v.nearest - skin)),
+                       v.who.sphere.centre};
 }
 
 /// Walls and bodies are compared when they have moved against each other since the last time, and at the start of a run.

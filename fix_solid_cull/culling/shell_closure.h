@@ -15,12 +15,13 @@
 
 namespace solidcull {
 
-/// When nothing stored was near an exterior granule.
+/// When an exterior granule was far enough from what is stored.
 struct Cleared {
   int version = never;     ///< of what stands in the store
-  bool made = false;       ///< since the last membership change: it may be anywhere
+  float way = 0;           ///< that it may go before it can be near (m)
   Vec3 at = Vec3::Zero();  ///< where it was then (m)
   static constexpr int never = -1;
+  static constexpr int made = -2;  ///< since the last membership change: it may be anywhere
 
   static constexpr int packed_size = 0;  // is found again
   void pack(double*) const {}
@@ -43,7 +44,10 @@ class ShellClosure : public BodyFollower {
   void unlocked(int i) { rows_[i].version = Cleared::never; }
 
   // --- granules that were made since the last membership change
-  void was_made(int i) { rows_[i].made = some_made_ = true; }  ///< local
+  void was_made(int i) {  ///< local
+    rows_[i].version = Cleared::made;
+    some_made_ = true;
+  }
   struct Overlapped {
     std::int64_t in_stored = 0;  ///< tag of a new granule that overlaps a stored one; 0: none does. On all ranks
     bool some = false;           ///< a new one overlaps a culled one, on any rank
@@ -91,8 +95,9 @@ class ShellClosure : public BodyFollower {
  private:
   struct Visitor {
     Foreign who;
-    int atom;    // an exterior granule of this rank, else -1
-    bool clear;  // of what is stored in frames that stand
+    int atom;        // an exterior granule of this rank, else -1
+    bool clear;      // of what is stored in frames that stand
+    double nearest;  // of what is stored there and stays: between surfaces, up to the gap (m)
   };
   struct Frame;
   class Frames;
