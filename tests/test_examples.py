@@ -273,6 +273,20 @@ class Validation(Scripts):
                     self.assertGreater(min(without["user"], with_it["user"], result["user"]), 0)
                     self.assertGreaterEqual(with_it["culled"], with_it["restored"])
 
+    def test_chain(self):
+        few = ROOT / "validation" / "chain" / "out" / "few"
+        (few / "chain.json").unlink(missing_ok=True)
+        self.run_script(few.parents[1] / "chain.py")
+        report = json.loads((few / "chain.json").read_text())
+        weak, strong = report["runs"]
+        for run in (weak, strong):
+            for kind in ("unculled", "culled"):
+                self.assertLess(abs(run[kind]["rest"] / report["granules"] - 1), 1e-5)
+        self.assertLess(abs(weak["unculled"]["arrival"] / report["way_down"] - 1), 0.05)
+        self.assertGreater(weak["culled"]["back"], 2 * weak["unculled"]["back"], "what sleeps throws a weak strike back")
+        for what in ("rise", "arrival", "back"):
+            self.assertLess(abs(strong["culled"][what] / strong["unculled"][what] - 1), 0.05, what)
+
     def test_activity(self):
         few = ROOT / "validation" / "activity" / "out" / "few"
         # asleep, so that the small beds, a few granules high, are culled at all
