@@ -239,13 +239,9 @@ void Culling::collect_wakes() {
 bool Culling::ask_for_those_that_wake() {
   bool waking = false;
   for (const int i : p_.motion.interface_atoms()) {
-    const double before = bed_.shell[i].excess_before, excess = bed_.shell.take_excess(i);
+    const double excess = bed_.shell.take_excess(i);
     if (excess <= 1) continue;
-    const WakeUpLaw& law = bed_.scales.wake_up();
-    if (WakeUpLaw::grew_slowly(before))
-      bed_.wake.ask(bed_.atoms.place(i), law.slow_radius(excess));
-    else
-      bed_.wake.ask_by_load(bed_.atoms.place(i), law.radius(excess));
+    bed_.wake.ask_by_load(bed_.atoms.place(i), bed_.scales.wake_up().radius(excess));
     waking = true;
   }
   return waking;

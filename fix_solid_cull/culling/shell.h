@@ -30,7 +30,6 @@ struct Locked {
   Vec3 load_change = Vec3::Zero();  ///< F_ext - reference at the last step; frame of the body (N)
   double normal_load = not_known;   ///< sum of normal contact forces at locking (N)
   double excess = 0;                ///< largest load change over tolerance since it was last asked
-  double excess_before = 0;         ///< likewise, between the two times before
   std::int64_t lock_step = -1;
   std::int64_t came_back = -1;                        ///< step in which it came out of the store
   int clump = 0, spheres = 0;                         ///< number of the clump that it is a sphere of, and of how many, or
@@ -39,12 +38,12 @@ struct Locked {
 
   bool in_body() const { return locked && body > 0; }
 
-  static constexpr int packed_size = 21;
+  static constexpr int packed_size = 20;
   void pack(double* to) const {
-    const double values[packed_size] = {
-        double(locked), double(fresh),  double(held), reference[0], reference[1],      reference[2],    load_change[0],
-        load_change[1], load_change[2], normal_load,  excess,       double(lock_step), velocity[0],     velocity[1],
-        velocity[2],    spin[0],        spin[1],      spin[2],      double(clump),     double(spheres), excess_before};
+    const double values[packed_size] = {double(locked), double(fresh),     double(held),   reference[0],   reference[1],
+                                        reference[2],   load_change[0],    load_change[1], load_change[2], normal_load,
+                                        excess,         double(lock_step), velocity[0],    velocity[1],    velocity[2],
+                                        spin[0],        spin[1],           spin[2],        double(clump),  double(spheres)};
     std::copy_n(values, packed_size, to);
   }
   static Locked unpack(const double* v) {
@@ -61,7 +60,6 @@ struct Locked {
     l.spin = vec(v + 15);
     l.clump = static_cast<int>(v[18]);
     l.spheres = static_cast<int>(v[19]);
-    l.excess_before = v[20];
     return l;
   }
 };
@@ -84,7 +82,7 @@ class Shell : public FollowsAtoms {
     e.locked = e.fresh = true;
     e.load_change = Vec3::Zero();
     e.normal_load = normal_load;
-    e.excess = e.excess_before = 0;
+    e.excess = 0;
     e.held = held;
     e.lock_step = step;
     e.velocity = atoms.velocity(i);
@@ -95,7 +93,7 @@ class Shell : public FollowsAtoms {
   void unlock(Atoms& atoms, int i) {
     Locked& e = changed(i);
     e.locked = e.fresh = false;
-    e.excess = e.excess_before = 0;
+    e.excess = 0;
     e.normal_load = Locked::not_known;
     atoms.mark_interface(i, false);
     labels_[i] = 0;
@@ -189,7 +187,6 @@ class Shell : public FollowsAtoms {
   void raise_excess(int i, double excess) { rows_[i].excess = std::max(rows_[i].excess, excess); }
   double take_excess(int i) {
     const double excess = rows_[i].excess;
-    rows_[i].excess_before = excess;
     rows_[i].excess = 0;
     return excess;
   }

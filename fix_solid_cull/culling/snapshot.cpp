@@ -13,7 +13,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261227;  // the format's version
+constexpr double file_mark = 20261210;  // the format's version
 /// The numbers in the file's head. The largest stored radius of each type and a check sum follow them.
 enum Header {
   mark,

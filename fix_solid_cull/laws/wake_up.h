@@ -44,14 +44,6 @@ struct WakeUpLaw {
   /// Radius (m) of the ball that a waking granule carves: r0 (1 + c log2(excess)), at most cap r0 (theory.md#carve). excess >= 1.
   double radius(double excess) const;
 
-  /// Whether the load of a granule that wakes has grown slowly: when it was asked the time before, its change was `before`
-  /// tolerances already. A wave, or support that has gone, brings the whole change between two times.
-  static bool grew_slowly(double before) { return before > slow_share; }
-  /// The ball that it carves then (m), in a front too: what it leaves locked is watched, and its load grows no faster, so that it
-  /// wakes in time. excess >= 1.
-  double slow_radius(double excess) const { return slow_size * radius(excess); }
-  static constexpr double slow_share = 0.5, slow_size = 0.3;
-
   /// A granule that wakes beside this many others is in a front: a wave passes, or the support of many has gone. Balls around a
   /// front run ahead of it: with an r0 of one diameter a wave would lose a tenth of what it does to the floor, and a bed would
   /// fall late.

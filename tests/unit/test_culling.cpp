@@ -168,30 +168,6 @@ TEST(Culling, a_blow_wakes_what_it_strikes) {
   EXPECT_GT(world.atoms.velocity(i).norm(), 0.01);  // it does not stand like a rock
 }
 
-/// A plane comes down on a column that sleeps, so fast that the load of its top granule grows by so many tolerances between two
-/// times at which granules are asked. Returns how many wake first.
-double wake_under_a_press(double tolerances) {
-  SmallDeck deck = Column::deck();
-  const double high = 2 * Column::granules * r;
-  deck.planes = {{"press", Vec3(0, 0, high + 0.01), Vec3(0, 0, -1), true}};
-  SmallWorld world(deck);
-  Column column(world);
-  column.run(200);
-  EXPECT_EQ(column.value(exterior), 0);
-  constexpr double tolerance_in_weights = 0.5;  // of who bears its own weight alone
-  constexpr int asked_each = 20;                // steps
-  world.deck.planes[0].point[2] = column.top + r + 1e-7;
-  world.deck.planes[0].velocity[2] =
-      -tolerances * tolerance_in_weights * column.weight() / (world.deck.stiffness * asked_each * world.run.dt);
-  for (int step = 0; step < 2000 && column.value(restored) == 0; ++step) world.steps(&column.culling, 1);
-  return column.value(restored);
-}
-
-TEST(Culling, who_is_pressed_slowly_wakes_alone) {
-  EXPECT_EQ(wake_under_a_press(0.15), 1);
-  EXPECT_GE(wake_under_a_press(4), 3);
-}
-
 TEST(Culling, the_centre_of_mass_of_a_column_that_loses_its_floor_falls_freely) {
   SmallDeck deck = Column::deck();
   deck.meshes[0].moving = true;

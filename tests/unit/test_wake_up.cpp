@@ -69,15 +69,6 @@ TEST(WakeUpLaw, in_a_front_the_ball_of_two_diameters_is_the_least) {
   EXPECT_DOUBLE_EQ(law.front_reach(), 3 * d);
 }
 
-TEST(WakeUpLaw, who_stood_at_half_the_tolerance_before_carves_a_small_ball) {
-  EXPECT_FALSE(WakeUpLaw::grew_slowly(0));
-  EXPECT_FALSE(WakeUpLaw::grew_slowly(0.5));
-  EXPECT_TRUE(WakeUpLaw::grew_slowly(0.51));
-  EXPECT_TRUE(WakeUpLaw::grew_slowly(1));
-  for (const double excess : {1.0, 2.0, 1000.0}) EXPECT_DOUBLE_EQ(law.slow_radius(excess), 0.3 * law.radius(excess));
-  EXPECT_LT(law.slow_radius(1), d);  // by default: the granule alone
-}
-
 TEST(WakeUpLaw, the_carved_ball_never_shrinks_below_r0) {
   EXPECT_DOUBLE_EQ(law.radius(0.5), r0);
   EXPECT_DOUBLE_EQ(law.radius(0), r0);
