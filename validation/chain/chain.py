@@ -16,7 +16,7 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))
-from solidcull_runs import decks, engine, errors  # noqa: E402
+from solidcull_runs import decks, engine, errors, meshes  # noqa: E402
 
 OUT = HERE / "out"
 GRANULES, FEW = 100, 20
@@ -54,21 +54,18 @@ class Chain:
         atoms = "".join(f"{k + 1} 1 {DIAMETER:.17g} {DENSITY} 0 0 {z:.17g}\n" for k, z in enumerate(self.places))
         data.write_text(f"chain\n\n{self.granules} atoms\n1 atom types\n\n-0.01 0.01 xlo xhi\n-0.01 0.01 ylo yhi\n"
                         f"-0.001 {self.places[-1] + 0.02:g} zlo zhi\n\nAtoms\n\n{atoms}")
-        a, b, c, d = "-0.01 -0.01 0", "0.01 -0.01 0", "0.01 0.01 0", "-0.01 0.01 0"
-        floor.write_text("solid floor\n" + "".join("facet normal 0 0 1\nouter loop\n" + "".join(f"vertex {p}\n" for p in corners) + "endloop\nendfacet\n"
-                                                   for corners in ((a, b, c), (a, c, d))) + "endsolid floor\n")
+        meshes.write_stl(floor, meshes.grid((-0.01, -0.01, 0), (0.02, 0, 0), (0, 0.02, 0), 1, 1))
 
 
 def run(chain, kind, speed, dt, place):
     """What the floor and the top granule do: load at rest, largest rise of the load, when half of it is reached, and what comes back up."""
-    base = place / f"{kind}-{speed:g}-{dt:g}"
-    data, floor, rows = place / "chain.data", place / "floor.stl", base.with_suffix(".rows")
+    base = f"{kind}-{speed:g}-{dt:g}"
+    data, floor, rows, deck, log = (place / name for name in ("chain.data", "floor.stl", f"{base}.rows", f"{base}.in", f"{base}.log"))
     chain.write(data, floor)
-    lines = decks.make_deck(decks.read_deck(HERE / "chain.in"), "cull", kind == "culled", None, "${base}")
-    deck = base.with_suffix(".in")
-    deck.write_text("\n".join(line for line in lines if "twin_counts" not in line and "${base}" not in line) + "\n")
+    lines = decks.make_deck(decks.read_deck(HERE / "chain.in"), "cull", kind == "culled", None, place / base)
+    deck.write_text("\n".join(line for line in lines if "twin_counts" not in line) + "\n")
     steps = round(ECHO * chain.way_down / dt)
-    engine.run_liggghts(deck, HERE, base.with_suffix(".log"),
+    engine.run_liggghts(deck, HERE, log,
                         {"data": data, "floor": floor, "rows": rows, "granules": chain.granules, "dt": dt, "rest": round(REST / dt), "steps": steps,
                          "speed": repr(speed), "culling": "exterior sleep"})
     step, load, top = np.loadtxt(rows)[1:].T  # the row before the first step counts the mesh's load twice
