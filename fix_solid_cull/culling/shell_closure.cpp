@@ -8,8 +8,8 @@
 namespace solidcull {
 namespace {
 
-// an exterior granule that nothing stored was near to need not be looked at again until it has moved by this many skins: it may
-// have gone as far the other way when the last went to the store, so twice this and one skin is the gap
+// the farthest that an exterior granule may go before it is looked at again, in skins: it may have gone as far the other way when
+// the last went to the store, so twice this and one skin is the gap
 constexpr double clear_way_in_skins = 0.75;
 // so many moving frames are compared with a granule one by one, more as one box
 constexpr std::size_t few_frames = 8;
@@ -88,8 +88,9 @@ void ShellClosure::forget_new() {
 /// Since it was last looked at it has moved less than would bring it near to what was stored then, in frames that stand, and only
 /// what is farther than store_gap_in_skins from all exterior granules went to the store.
 bool ShellClosure::is_clear(int i) const {
-  const double way = rows_[i].way;
-  return rows_[i].version == bed_.solid.standing_version() && (bed_.atoms.place(i) - rows_[i].at).squaredNorm() < way * way;
+  const Cleared& row = rows_[i];
+  const double way = row.way;
+  return row.version == bed_.solid.standing_version() && (bed_.atoms.place(i) - row.at).squaredNorm() < way * way;
 }
 
 // ------------------------------------------------------------------------------------------------- what comes near stored
