@@ -10,6 +10,8 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import numpy as np
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT))
@@ -751,6 +753,28 @@ class NoHarm(Case):
         self.assertEqual(sum(counted), 200 * 343)
         self.assertGreater(counted[2], 0)
         self.assertIn(f"  left out      = {counted[2] / 200:.0f} (", told[3])
+
+    def test_per_atom_reasons(self):
+        for ranks in (1, 2):
+            with tempfile.TemporaryDirectory(prefix="solidcull-") as place:
+                run = self.accepted(BLOCK + CULL_BLOCK + " reasons yes\n"
+                                    f"dump d all custom 100 {place}/*.dump id f_cull[1] f_cull[2] f_cull[3]\nrun 200\n"
+                                    "create_atoms 1 single 0.0105 0.0105 0.026 units box\ngroup ball id 344\n"
+                                    "set group ball diameter 0.003 density 2500\nvelocity ball set 0 0 -4 units box\nrun 100\n"
+                                    f"write_dump all custom {place}/whole id f_cull[1] f_cull[2] f_cull[3]\n", ranks=ranks)
+                rows = {name: np.loadtxt(Path(place, name), skiprows=9) for name in ("0.dump", "200.dump", "300.dump", "whole")}
+            exterior = {name: r[r[:, 1] == 0] for name, r in rows.items()}
+            for name, r in rows.items():
+                self.assertEqual(abs(r[r[:, 1] != 0, 2:]).max(initial=0), 0, "what is asleep has no reason to be awake")
+                self.assertTrue(((exterior[name][:, 2] >= 1) & (exterior[name][:, 2] <= 8)).all())
+            self.assertEqual(len(rows["whole"]), 344)
+            self.assertGreater(len(rows["200.dump"]), len(exterior["200.dump"]))
+            self.assertEqual(exterior["0.dump"][:, 3].max(), 0, "none has been culled")
+            ball = exterior["300.dump"][exterior["300.dump"][:, 0] == 344]
+            self.assertEqual((len(ball), ball[0, 3]), (1, 0))
+            self.assertIn(1, exterior["300.dump"][:, 3], "the ball has struck")
+            woken = re.findall(r"^  woken by      = loads that changed \d+ %.*, of (\d+)$", run.log, re.M)
+            self.assertGreaterEqual(sum(map(int, woken)), (exterior["300.dump"][:, 3] == 1).sum())
 
     def test_all_counters_follow_where_they_are_asked_for(self):
         run = self.accepted(BLOCK + CULL_BLOCK + " report full\nrun 200\nrun 0\n")

@@ -83,7 +83,7 @@ void Bed::see_largest_radius() {
   largest_clump = all[1];
 }
 
-Wakes Bed::take_wakes(bool all) {
+Wakes Bed::take_wakes(Woke all) {
   // a body that wakes on one rank wakes on each
   std::vector<char> asked;
   for (std::size_t p = 0; p < groups.spanning_parts(); ++p) asked.push_back(wake.asks_body(groups.body_of_part(p)));

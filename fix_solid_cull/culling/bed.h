@@ -31,7 +31,7 @@ struct Bed : BedState, BodyFollower {
   /// The largest radius is known on all ranks. Collective; a change does it, too.
   void see_largest_radius();
   /// All that wakes on this rank, `all` if some rank has asked so. Collective.
-  Wakes take_wakes(bool all);
+  Wakes take_wakes(Woke all);
   /// Each atom is labelled with its body's number over all ranks. Local.
   void label_bodies();
 

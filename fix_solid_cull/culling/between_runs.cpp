@@ -86,7 +86,7 @@ std::int64_t BetweenRuns::restore_all(Phase phase) {
     p_.shown.shown() ? hide_bed() : leave_lists();
     bed_.ranks.update();
     change_.forget_lost();
-    bed_.wake.ask_all();
+    bed_.wake.ask_all(Woke::deck);
     change_.make(look_, phase);
     p_.shown.give_changes();
   }

@@ -58,7 +58,7 @@ auto Change::begin(const Look& look) -> Occasion {
   enum { asked, wakes_all, lets_go, asks_to_store, made, far, unsettled, tag, radius, clump, numbers };
   double all[numbers] = {};
   all[asked] = look.chosen().any_here() || bed_.wake.any_here();
-  all[wakes_all] = bed_.wake.asks_all();
+  all[wakes_all] = static_cast<double>(bed_.wake.asks_all());
   all[lets_go] = p_.grounding.lets_go();
   all[asks_to_store] = p_.deep.asked();
   all[made] = p_.closure.some_made();
@@ -74,7 +74,7 @@ auto Change::begin(const Look& look) -> Occasion {
   if (all[unsettled] != 0) settle_bodies();
   Occasion now;
   now.asked = all[asked] != 0;
-  now.wakes_all = all[wakes_all] != 0;
+  now.wakes_all = static_cast<Woke>(all[wakes_all]);
   now.lets_go = all[lets_go] != 0;
   now.asks_to_store = all[asks_to_store] != 0;
   now.made = all[made] != 0;
@@ -110,7 +110,7 @@ void Change::make(Look& look, Phase phase) {
   const Occasion now = begin(look);
   const bool overlaps = now.made && meet_new_granules(phase);
   bed_.memory.freed(p_.exchange.forget_past_motions());
-  if (!bed_.census.something_locked() && !now.asked && !now.wakes_all) {
+  if (!bed_.census.something_locked() && !now.asked && now.wakes_all == Woke::never) {
     move_cuts();
     return;
   }
@@ -159,10 +159,10 @@ void Change::wake_counted_clumps() {
   for (const Box& box : p_.closure.opened(bed_.run.skin)) {
     for (int i = 0; i < bed_.atoms.owned; ++i)
       if (bed_.shell[i].locked && bed_.shell[i].clump && box.holds(bed_.atoms.place(i)))
-        bed_.wake.ask(bed_.atoms.place(i), 0.5 * bed_.atoms.radius[i]);
+        bed_.wake.ask(bed_.atoms.place(i), 0.5 * bed_.atoms.radius[i], Woke::deck);
     bed_.stored.for_each_in_box(box.lo, box.hi, [&](const Resident& g) {
       const Vec3 x = bed_.solid.in_world(g);
-      if (box.holds(x) && bed_.solid.store().get(g.tag).clump) bed_.wake.ask(x, 0.5 * g.radius);
+      if (box.holds(x) && bed_.solid.store().get(g.tag).clump) bed_.wake.ask(x, 0.5 * g.radius, Woke::deck);
     });
   }
 }
@@ -179,7 +179,7 @@ bool Change::meet_new_granules(Phase phase) {
       throw InputError("granule " + std::to_string(found.in_stored) +
                        " was inserted into the place of a culled one: give the insertion a region above the bed, or unfix " +
                        bed_.run.name + " first");
-    for (const Vec3& place : found.places) bed_.wake.ask(place, bed_.scales.wake_up().radius(1));
+    for (const Vec3& place : found.places) bed_.wake.ask(place, bed_.scales.wake_up().radius(1), Woke::insertion);
     overlaps = found.some;
   }
   p_.closure.forget_new();

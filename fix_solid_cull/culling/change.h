@@ -29,12 +29,12 @@ class Change {
   /// What all ranks know as a change begins.
   struct Occasion {
     bool asked = false;  ///< something is to wake, or was chosen
-    bool wakes_all = false;
+    Woke wakes_all = Woke::never;
     bool lets_go = false;  ///< bodies that stood on walls do no longer
     bool asks_to_store = false;
     bool made = false;         ///< there are new granules
     std::int64_t highest = 0;  ///< tag of an atom
-    bool changes() const { return asked || wakes_all || lets_go; }
+    bool changes() const { return asked || wakes_all != Woke::never || lets_go; }
   };
   /// And when it has been made.
   struct Outcome {

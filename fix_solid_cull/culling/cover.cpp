@@ -285,7 +285,7 @@ void Cover::wake_exposed() {
     const Vec3 x = observer_.to_frame(bed_.atoms.place(i));
     if (!surface_->touched_near(x, depth + bed_.scales.closing())) continue;
     d.nearest_void = surface_->void_within(x, depth, d.nearest_void);
-    if (!d.nearest_void.none()) bed_.wake.ask(bed_.atoms.place(i), 0.5 * bed_.atoms.radius[i]);
+    if (!d.nearest_void.none()) bed_.wake.ask(bed_.atoms.place(i), 0.5 * bed_.atoms.radius[i], Woke::exposed);
   }
   surface_->clear_touched();
 }

@@ -139,6 +139,7 @@ void Culling::initial_step() {
   phase_ = Phase::stepping;
   if (!first || !bed_.solid.has_store()) return;
   p_.meter.begin_run(p_.report.seconds());
+  p_.forecaster.begin_run();
   take_loads();
   p_.gravity.begin_run();
   look_.see_walls(true);
@@ -236,12 +237,19 @@ void Culling::collect_wakes() {
 }
 
 /// Whether any does.
+Label Culling::label_with_reasons(int i) const {
+  const double body = bed_.shell.labels()[i];
+  const AtRest& r = p_.survey[i];
+  if (bed_.shell.locked(i) || body != 0) return {body, 0, 0};
+  return {0, 1.0 + static_cast<int>(r.awake), static_cast<double>(r.woke_by)};
+}
+
 bool Culling::ask_for_those_that_wake() {
   bool waking = false;
   for (const int i : p_.motion.interface_atoms()) {
     const double excess = bed_.shell.take_excess(i);
     if (excess <= 1) continue;
-    bed_.wake.ask_by_load(bed_.atoms.place(i), bed_.scales.wake_up().radius(excess));
+    bed_.wake.ask(bed_.atoms.place(i), bed_.scales.wake_up().radius(excess), Woke::load);
     waking = true;
   }
   return waking;

@@ -1,6 +1,7 @@
 // Solid-state culling as a whole: owns its parts, and says in which order they act. Knows no engine but through the ports.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <initializer_list>
 #include <map>
@@ -17,6 +18,9 @@ namespace solidcull {
 
 /// Called by the adapter in the engine's hooks, in the order of a time step. All are collective unless they say otherwise.
 /// InputError: the user's fault, on all ranks alike; RunFailure: the run's, on any rank; any other exception: ours.
+/// What f_ID shows of an atom with `reasons yes`: its body, what keeps it awake, what woke it.
+using Label = std::array<double, 3>;
+
 class Culling {
  public:
   Culling(const Ports& ports, const Settings& settings, int types) : p_(ports, settings, types) {}
@@ -90,6 +94,7 @@ class Culling {
   void was_made(int i) { p_.closure.was_made(i); }  ///< by a fix that inserts, or any other way
   void read_from_file(int i) { p_.cover.forget(i); }
   double* labels() { return bed_.shell.labels(); }
+  Label label_with_reasons(int i) const;
 
  private:
   void expect(std::initializer_list<Phase> phases, const char* where) const;

@@ -28,6 +28,7 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       meter(bed),
       report(bed, motion, meter),
       run_end(bed, meter, report, balance),
+      forecaster(bed, meter, report),
       files(bed, meshes, report),
       invariants(bed),
       followers{&bed.shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown, &bed.locked_clumps} {

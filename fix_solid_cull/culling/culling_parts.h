@@ -13,6 +13,7 @@
 #include "deck_claims.h"
 #include "deep_granules.h"
 #include "effective_gravity.h"
+#include "forecaster.h"
 #include "grounding.h"
 #include "handover.h"
 #include "invariants.h"
@@ -74,6 +75,7 @@ struct CullingParts {
   WorkMeter meter;
   Report report;
   RunEnd run_end;
+  Forecaster forecaster;
   OutputFiles files;
   Invariants invariants;
   std::vector<FollowsAtoms*> followers;  // what keeps something for each atom

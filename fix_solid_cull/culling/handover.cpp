@@ -165,12 +165,12 @@ void Handover::wake_rest_of_clumps(const std::vector<LostGranule>& lost) {
     if (bed_.ranks.count == 1) continue;
     // the others may be on other ranks, none of them here: all that are as near to it as they wake
     const Pose& pose = bed_.solid.bodies().pose(bed_.solid.bodies().body_of(b.tag));
-    bed_.wake.ask(pose.to_world(b.granule.position), bed_.clump_spheres.reach());
+    bed_.wake.ask(pose.to_world(b.granule.position), bed_.clump_spheres.reach(), Woke::lost);
   }
   if (clumps.empty()) return;
   for (int i = 0; i < bed_.atoms.owned; ++i)
     if (bed_.shell[i].locked && clumps.contains(bed_.shell[i].clump)) {
-      bed_.wake.ask(bed_.atoms.place(i), 0.5 * bed_.atoms.radius[i]);
+      bed_.wake.ask(bed_.atoms.place(i), 0.5 * bed_.atoms.radius[i], Woke::lost);
       bed_.shell.set_clump(i, bed_.shell[i].clump, Locked::some_lost);
     }
   bed_.locked_clumps.forget_all_but([&](std::int64_t tag) { return bed_.index.contains(tag); });

@@ -34,6 +34,7 @@ void Look::look() {
   chosen_ = survey(may_cull, any_culled);
   if (judge(may_cull)) p_.ask_for_build(step + 1);
   p_.pacing.schedule(step, bed_.census.something_locked(), bed_.census.something_stored());
+  p_.forecaster.see_look();
 }
 
 /// Before the first step of a run in which nothing is culled. What the deck has tilted since the last one begins to move now.
@@ -71,7 +72,7 @@ Proposal Look::survey(bool may_cull, bool any_culled) {
     p_.cover.wake_exposed();
   }
   if (p_.survey.some_chosen_near(proposal) || bed_.clumps.possible) p_.survey.tie(proposal);
-  p_.meter.see_awake(p_.survey.count_awake(patience, proposal));
+  p_.meter.see_awake(p_.survey.see_awake(patience, proposal));
   return proposal;
 }
 
@@ -125,7 +126,7 @@ bool Look::judge(bool may_cull) {
   if (verdict.wait == 0) return all[wakes] != 0;
   p_.pacing.see_wait(verdict.wait, p_.survey.kinetic_energy_of_exterior(), step);
   if (verdict.give_back) {
-    bed_.wake.ask_all();
+    bed_.wake.ask_all(Woke::no_gain);
     p_.ask_for_build(step + 1);
   }
   if (verdict.tell)

@@ -17,7 +17,7 @@ MembershipChange::MembershipChange(Bed& bed, const Parts& parts, Wakes wakes, Pr
 
 void MembershipChange::free_and_lock() {
   free_what_wakes();
-  if (!wakes_.all) lock_what_was_chosen();
+  if (!wakes_.wakes_all()) lock_what_was_chosen();
   tell_neighbours();
 }
 
@@ -29,10 +29,11 @@ void MembershipChange::lock(int i) {
   bed_.solid.count_locked();
 }
 
-void MembershipChange::unlock(int i) {
+void MembershipChange::unlock(int i, Woke by) {
   if (const int clump = bed_.shell[i].clump) bed_.clumps.set_clump(i, clump);
   bed_.shell.unlock(bed_.atoms, i);
-  p_.survey.note_wake(i);
+  p_.survey.note_wake(i, by);
+  bed_.solid.count_woken(by);
   p_.closure.unlocked(i);
 }
 
@@ -40,32 +41,50 @@ void MembershipChange::free_what_wakes() {
   if (wakes_.none() && !bed_.clumps.possible) return;
   std::set<int> whole;  // bodies of this rank that wake as a whole
   for (const auto& b : bed_.solid.bodies().bodies())
-    if (wakes_.all || wakes_.wakes_body(b.first)) whole.insert(b.first);
+    if (wakes_.wakes_all() || wakes_.wakes_body(b.first)) whole.insert(b.first);
+  const Woke with_body = wakes_.wakes_all() ? wakes_.all : Woke::shaken;
   const Atoms& atoms = bed_.atoms;
-  std::vector<char> wakes(static_cast<std::size_t>(atoms.owned));
+  std::vector<Woke> wakes(static_cast<std::size_t>(atoms.owned), Woke::never);
   for (int i = 0; i < atoms.owned; ++i)
-    wakes[i] = bed_.shell[i].locked && (whole.count(bed_.shell[i].body) || wakes_.in_ball(atoms.place(i), 0));
-  bed_.clump_spheres.any_of(wakes);
+    if (bed_.shell[i].locked) wakes[i] = whole.count(bed_.shell[i].body) ? with_body : wakes_.in_balls(atoms.place(i));
+  bed_.clump_spheres.unite(wakes, [](Woke& one, Woke other) { one = std::max(one, other); });
   for (int i = 0; i < atoms.owned; ++i)
-    if (wakes[i]) {
-      unlock(i);
+    if (wakes[i] != Woke::never) {
+      unlock(i, wakes[i]);
       changes_.freed.push_back(atoms.tag[i]);
     }
   std::vector<std::int64_t> stored;
-  for (const int body : whole) bed_.solid.store().for_each_of_body(body, [&](const Resident& g) { stored.push_back(g.tag); });
+  FlatMap<Woke> by;
+  const auto wake_stored = [&](const Resident& g, Woke why) {
+    stored.push_back(g.tag);
+    by[g.tag] = why;
+  };
+  for (const int body : whole) bed_.solid.store().for_each_of_body(body, [&](const Resident& g) { wake_stored(g, with_body); });
   for (const Ball& b : wakes_.balls)
     bed_.stored.for_each_in_box(b.centre - Vec3::Constant(b.radius), b.centre + Vec3::Constant(b.radius), [&](const Resident& g) {
-      if (!whole.count(g.body) && b.holds(bed_.solid.nearest_image(bed_.solid.in_world(g), b.centre), 0)) stored.push_back(g.tag);
+      if (!whole.count(g.body) && b.holds(bed_.solid.nearest_image(bed_.solid.in_world(g), b.centre), 0)) wake_stored(g, b.by);
     });
-  if (bed_.clumps.possible) bed_.solid.add_rest_of_clumps(stored);
+  if (bed_.clumps.possible) {
+    bed_.solid.add_rest_of_clumps(stored);
+    name_rest_of_clumps(stored, by);
+  }
   std::sort(stored.begin(), stored.end());
   stored.erase(std::unique(stored.begin(), stored.end()), stored.end());
   for (const std::int64_t tag : stored) {
-    unlock(p_.exchange.bring_back(tag));
+    unlock(p_.exchange.bring_back(tag), by[tag]);
     changes_.freed.push_back(tag);
   }
   if (bed_.clumps.possible) p_.exchange.join_images(stored);
   for (const std::int64_t tag : changes_.freed) changes_.freed_anywhere[tag] = 1;
+}
+
+/// What a sphere wakes by, the others of its clump do.
+void MembershipChange::name_rest_of_clumps(const std::vector<std::int64_t>& stored, FlatMap<Woke>& by) const {
+  FlatMap<Woke> of_clump;
+  const auto clump_of = [&](std::int64_t tag) { return bed_.solid.store().get(tag).clump; };
+  by.for_each([&](std::int64_t tag, Woke why) { of_clump[clump_of(tag)] = why; });
+  for (const std::int64_t tag : stored)
+    if (!by.contains(tag)) by[tag] = of_clump[clump_of(tag)];
 }
 
 /// Since the look it may have been struck or moved.

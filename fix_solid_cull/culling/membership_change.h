@@ -46,7 +46,8 @@ class MembershipChange {
   void lock_what_was_chosen();
   void tell_neighbours();
   void lock(int i);
-  void unlock(int i);
+  void unlock(int i, Woke by);
+  void name_rest_of_clumps(const std::vector<std::int64_t>& stored, FlatMap<Woke>& by) const;
   void lock_clumps(const std::vector<int>& locked);
   void give_clump_back(int sphere, int body, bool as_it_was, MovingGranule& given);
   bool still_rests(int i) const;

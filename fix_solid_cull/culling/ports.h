@@ -433,12 +433,13 @@ class Run {
  public:
   virtual ~Run() = default;
 
-  std::int64_t step = 0;      ///< goes on where the deck resets its time step
-  std::int64_t reset_by = 0;  ///< the deck's number of this step, less `step`
-  double dt = 0;              ///< s
-  double skin = 0;            ///< Verlet skin (m)
-  Box box;                    ///< the whole of it
-  Box kept;                   ///< what passes its sides is lost; infinite where the box is periodic or follows the granules
+  std::int64_t step = 0;        ///< goes on where the deck resets its time step
+  std::int64_t reset_by = 0;    ///< the deck's number of this step, less `step`
+  std::int64_t steps_left = 0;  ///< of this run, as far as the deck says
+  double dt = 0;                ///< s
+  double skin = 0;              ///< Verlet skin (m)
+  Box box;                      ///< the whole of it
+  Box kept;                     ///< what passes its sides is lost; infinite where the box is periodic or follows the granules
   std::array<bool, 3> periodic{};
   std::string name;  ///< the fix's ID
 

@@ -16,7 +16,10 @@ double Report::value(int n) {
   totals_version_ = membership_version_;
   if (totals_.empty()) count_totals();
   if (n < counts) return totals_[n];
-  if (n == size - 1) return meter_.times_less();  // known when a run has ended: its last step has been counted before
+  if (n >= size - gains) {
+    const Forecast& f = forecast_;
+    return std::array<double, gains>{meter_.times_less(), f.times_less, f.awake, f.moving}[n - (size - gains)];
+  }
   if (n >= counts + carried + of_all + again) return spent_[n - counts - carried - of_all - again];
   if (n >= counts + carried + of_all) return rests_again_[n - counts - carried - of_all];
   if (n < counts + carried) {

@@ -7,6 +7,7 @@
 
 #include "bed.h"
 #include "body_motion.h"
+#include "forecast.h"
 #include "stop_watch.h"
 #include "work_meter.h"
 
@@ -19,10 +20,15 @@ class Report {
   static constexpr int of_all = 6;    ///< and what all granules have together
   static constexpr int again = 2;     ///< how many were culled again, and how many of them had moved
   static constexpr int spent = 3;     ///< granule-steps: exterior, interface, interior
-  static constexpr int size = counts + carried + of_all + again + spent + 1;  ///< the last: how many times less work
-  static constexpr int interior = 2;                                          ///< index of f_ID itself among them
+  static constexpr int gains = 4;     ///< times less work as measured and as forecast, and shares awake and moving that rests on
+  static constexpr int size = counts + carried + of_all + again + spent + gains;
+  static constexpr int interior = 2;  ///< index of f_ID itself among them
 
   Report(const Bed& bed, const BodyMotion& motion, const WorkMeter& meter) : bed_(bed), motion_(motion), meter_(meter) {}
+
+  /// What f_ID says of it from now on; before, nothing is known. Alike on all ranks.
+  void set_forecast(const Forecast& f) { forecast_ = f; }
+  const Forecast& told_forecast() const { return forecast_; }
 
   /// f_ID[n + 1]. Collective.
   double value(int n);
@@ -43,6 +49,7 @@ class Report {
   const BodyMotion& motion_;
   const WorkMeter& meter_;
   StopWatch watch_;
+  Forecast forecast_;
   std::array<double, again> rests_again_{};
   std::array<double, spent> spent_{};
   std::vector<double> totals_, carried_, all_;  // as of:

@@ -10,23 +10,24 @@ namespace solidcull {
 namespace {
 
 constexpr std::uint64_t begins = 0x31424c4c55434453, ends = 0x31454c4c55434453;  // "SDCULLB1", "SDCULLE1"
-constexpr std::size_t word = sizeof(std::uint64_t);
+constexpr std::size_t word_bytes = sizeof(std::uint64_t);
 constexpr int beginning_words = 2, head_words = 5, end_words = 9;
 constexpr std::size_t row_words = 4;  // of lists and of the table of parts
 constexpr std::uint64_t largest_chunk = std::uint64_t{1} << 31;
-static_assert(sizeof(ChunkPlace) == row_words * word && sizeof(SectionReader::Part) == row_words * word, "rows are words");
+static_assert(sizeof(ChunkPlace) == row_words * word_bytes && sizeof(SectionReader::Part) == row_words * word_bytes,
+              "rows are words");
 
 std::uint64_t sum_of_words(const std::uint64_t* words, std::size_t n) {
-  return section_sum(reinterpret_cast<const char*>(words), n * word);
+  return section_sum(reinterpret_cast<const char*>(words), n * word_bytes);
 }
 
 }  // namespace
 
 std::uint64_t section_sum(const char* bytes, std::size_t n) {
   std::uint64_t sum = 0;
-  for (std::size_t k = 0; k < n / word; ++k) {
+  for (std::size_t k = 0; k < n / word_bytes; ++k) {
     std::uint64_t w;
-    std::memcpy(&w, bytes + k * word, word);
+    std::memcpy(&w, bytes + k * word_bytes, word_bytes);
     w += (k + 1) * 0x9e3779b97f4a7c15u;
     w = (w ^ (w >> 32)) * 0xd6e8feb86659fd93u;
     sum += w ^ (w >> 29);
@@ -35,9 +36,9 @@ std::uint64_t section_sum(const char* bytes, std::size_t n) {
 }
 
 void SectionChunk::pack(std::vector<char>& to) const {
-  const std::size_t size = (bytes.size() + word - 1) / word * word, at = to.size();
-  to.resize(at + head_words * word + size);
-  char* const body = &to[at] + head_words * word;
+  const std::size_t size = (bytes.size() + word_bytes - 1) / word_bytes * word_bytes, at = to.size();
+  to.resize(at + head_words * word_bytes + size);
+  char* const body = &to[at] + head_words * word_bytes;
   std::copy(bytes.begin(), bytes.end(), body);
   std::uint64_t head[head_words] = {kind, rank, granules, size, 0};
   head[head_words - 1] = section_sum(body, size) + sum_of_words(head, head_words - 1);
@@ -50,7 +51,7 @@ const char* SectionChunk::unpack(const char* at, const char* end) {
   if (there < sizeof head) return nullptr;
   std::memcpy(head, at, sizeof head);
   const std::uint64_t size = head[3];
-  if (size % word != 0 || size > there - sizeof head) return nullptr;
+  if (size % word_bytes != 0 || size > there - sizeof head) return nullptr;
   at += sizeof head;
   if (head[head_words - 1] != section_sum(at, size) + sum_of_words(head, head_words - 1)) return nullptr;
   begin(head[0], head[1], head[2]);
@@ -87,10 +88,10 @@ bool SectionWriter::put(const SectionChunk& chunk) {
 
 void SectionWriter::close(const SectionCounts& counts) {
   SectionReader::Part part{0, chunks_.size(), 0, 0};
-  std::vector<char> list(chunks_.size() * sizeof(ChunkPlace) + word);
-  if (!chunks_.empty()) std::memcpy(list.data(), chunks_.data(), list.size() - word);
-  const std::uint64_t sum = section_sum(list.data(), list.size() - word);
-  std::memcpy(&list[list.size() - word], &sum, word);
+  std::vector<char> list(chunks_.size() * sizeof(ChunkPlace) + word_bytes);
+  if (!chunks_.empty()) std::memcpy(list.data(), chunks_.data(), list.size() - word_bytes);
+  const std::uint64_t sum = section_sum(list.data(), list.size() - word_bytes);
+  std::memcpy(&list[list.size() - word_bytes], &sum, word_bytes);
   for (const ChunkPlace& c : chunks_) {
     part.bytes += c.size;
     part.granules += c.granules;
@@ -102,11 +103,11 @@ void SectionWriter::close(const SectionCounts& counts) {
   const std::vector<SectionReader::Part> parts = ranks_.gather_on_root(std::vector<SectionReader::Part>{part});
   if (ranks_.me == 0) {
     std::vector<std::uint64_t> words(parts.size() * row_words);
-    std::memcpy(words.data(), parts.data(), words.size() * word);
-    words.insert(words.end(), {ends, identity_, written_ + (words.size() + end_words) * word, parts.size()});
+    std::memcpy(words.data(), parts.data(), words.size() * word_bytes);
+    words.insert(words.end(), {ends, identity_, written_ + (words.size() + end_words) * word_bytes, parts.size()});
     for (const std::int64_t n : all) words.push_back(static_cast<std::uint64_t>(n));
     words.push_back(sum_of_words(words.data(), words.size()));
-    file_->write(file_->size() + written_, words.data(), words.size() * word);
+    file_->write(file_->size() + written_, words.data(), words.size() * word_bytes);
   }
   std::int64_t error = file_->close();
   ranks_.largest(&error, 1);
@@ -157,13 +158,13 @@ std::string SectionReader::open(std::uint64_t identity, std::vector<std::uint64_
   if (fseeko(file_, 0, SEEK_END) != 0) return cut;
   const std::uint64_t size = static_cast<std::uint64_t>(ftello(file_));
   if (size < sizeof end || !fetch(size - sizeof end, end, sizeof end) || end[0] != ends) return cut;
-  const std::uint64_t least = (beginning_words + end_words) * word;
+  const std::uint64_t least = (beginning_words + end_words) * word_bytes;
   const std::uint64_t section = end[2], parts = end[3];
   const std::string damaged = file + " is damaged at its end: use another one";
-  if (section > size || section < least || parts > (section - least) / (row_words * word)) return damaged;
+  if (section > size || section < least || parts > (section - least) / (row_words * word_bytes)) return damaged;
   std::vector<std::uint64_t> table(parts * row_words);
-  const std::uint64_t table_at = size - sizeof end - table.size() * word;
-  const bool read = fetch(table_at, table.data(), table.size() * word);
+  const std::uint64_t table_at = size - sizeof end - table.size() * word_bytes;
+  const bool read = fetch(table_at, table.data(), table.size() * word_bytes);
   table.insert(table.end(), end, end + end_words - 1);
   if (!read || sum_of_words(table.data(), table.size()) != end[end_words - 1]) return damaged;
   std::uint64_t beginning[beginning_words];
@@ -195,16 +196,16 @@ std::vector<ChunkPlace> SectionReader::list(std::size_t part) {
   const Part& p = parts_[part];
   std::vector<ChunkPlace> list;
   std::uint64_t sum = 0, bytes = 0, granules = 0;
-  bool whole = p.list < end_of_chunks_ && end_of_chunks_ - p.list >= word &&
-               p.chunks <= (end_of_chunks_ - p.list - word) / sizeof(ChunkPlace);
+  bool whole = p.list < end_of_chunks_ && end_of_chunks_ - p.list >= word_bytes &&
+               p.chunks <= (end_of_chunks_ - p.list - word_bytes) / sizeof(ChunkPlace);
   if (whole) {
     list.resize(p.chunks);
     whole = fetch(begin_ + p.list, list.data(), list.size() * sizeof(ChunkPlace)) &&
-            fetch(begin_ + p.list + list.size() * sizeof(ChunkPlace), &sum, word) &&
+            fetch(begin_ + p.list + list.size() * sizeof(ChunkPlace), &sum, word_bytes) &&
             sum == section_sum(reinterpret_cast<const char*>(list.data()), list.size() * sizeof(ChunkPlace));
   }
   for (const ChunkPlace& c : list) {
-    whole = whole && c.size >= head_words * word && c.size <= largest_chunk && c.at <= end_of_chunks_ &&
+    whole = whole && c.size >= head_words * word_bytes && c.size <= largest_chunk && c.at <= end_of_chunks_ &&
             c.size <= end_of_chunks_ - c.at;
     bytes += c.size;
     granules += c.granules;

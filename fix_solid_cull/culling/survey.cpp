@@ -56,15 +56,16 @@ void Survey::begin_count() {
   why_.assign(static_cast<std::size_t>(bed_.atoms.owned), Awake::paused);
 }
 
-AwakeSteps Survey::count_awake(const Patience& patience, const Proposal& proposal) const {
+AwakeSteps Survey::see_awake(const Patience& patience, const Proposal& proposal) {
   const FlatMap<char> chosen = set_of(proposal.chosen);
   const bool covers = bed_.scales.depth() > 0;
   AwakeSteps awake = awake_;
   for (int i = 0; i < bed_.atoms.owned; ++i) {
     if (bed_.shell[i].locked) continue;
     const bool covered = covers && why_[i] == Awake::settling && calm_enough(i, patience) && !chosen.contains(bed_.atoms.tag[i]);
-    awake[covered ? Awake::covered : why_[i]] += 1;
-    awake.in_vain += rows_[i].woken && way_since_woken(i) <= moved_share * bed_.scales.diameter();
+    rows_[i].awake = covered ? Awake::covered : why_[i];
+    awake[rows_[i].awake] += 1;
+    awake.in_vain += rows_[i].woken() && way_since_woken(i) <= moved_share * bed_.scales.diameter();
   }
   return awake;
 }
@@ -426,7 +427,7 @@ void Survey::choose_deep(const Patience& patience, Cover& cover, Proposal& propo
 
 /// A granule that woke and still stands where it stood has shown before that it bears its load there: half of the looks.
 int Survey::looks_for(int i, const Patience& patience) const {
-  if (patience.quick || !rows_[i].woken) return patience.looks;
+  if (patience.quick || !rows_[i].woken()) return patience.looks;
   return way_since_woken(i) > stands_share * bed_.scales.diameter() ? patience.looks : (patience.looks + 1) / 2;
 }
 

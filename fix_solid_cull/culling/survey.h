@@ -26,9 +26,13 @@ struct AtRest {
   Vec3 velocity = Vec3::Zero();  ///< then (m/s)
   Vec3 acceleration_around = Vec3::Zero();  ///< of what it touched then (m/s^2)
   double normal_load = Locked::not_known;   ///< sum of normal contact forces at the last look (N)
-  bool woken = false;                       ///< it was culled, and is free again:
+  Awake awake = Awake::count;               ///< what kept it awake at the last look
+  Woke woke_by = Woke::never;               ///< it was culled, and is free again:
   Vec3 woke_at = Vec3::Zero();              ///< where it was then (m)
 
+  bool woken() const { return woke_by != Woke::never; }
+  /// Both reasons in one number; 1 for a granule of a file that is older than them, which woke.
+  double reasons() const { return double(woke_by) + 16.0 * ((double(awake) + 1) * (awake != Awake::count)); }
   static constexpr int packed_size = 14;
   void pack(double* to) const {
     const double values[packed_size] = {double(calm),
@@ -41,7 +45,7 @@ struct AtRest {
                                         acceleration_around[1],
                                         acceleration_around[2],
                                         normal_load,
-                                        double(woken),
+                                        reasons(),
                                         woke_at[0],
                                         woke_at[1],
                                         woke_at[2]};
@@ -55,7 +59,9 @@ struct AtRest {
     r.velocity = vec(v + 3);
     r.acceleration_around = vec(v + 6);
     r.normal_load = v[9];
-    r.woken = v[10] != 0;
+    const int why = static_cast<int>(v[10]);
+    r.woke_by = static_cast<Woke>(why % 16);
+    r.awake = why < 16 ? Awake::count : static_cast<Awake>(why / 16 - 1);
     r.woke_at = vec(v + 11);
     return r;
   }
@@ -70,17 +76,17 @@ class Survey {
   PerGranule<AtRest>& rows() { return rows_; }
   bool stands_at_wall(int i) const { return walls_[i].stands; }
   /// Owned granule i is free again.
-  void note_wake(int i) {
+  void note_wake(int i, Woke by) {
     begin_anew(i);
-    rows_[i].woken = true;
+    rows_[i].woke_by = by;
     rows_[i].woke_at = bed_.atoms.place(i);
   }
   /// It is locked; if it had been before: whether it has moved by more than d/100 since, where nothing carries it along.
   enum class Rested { first_time, unmoved, moved };
   Rested note_lock(int i) {
     begin_anew(i);
-    if (!rows_[i].woken) return Rested::first_time;
-    rows_[i].woken = false;
+    if (!rows_[i].woken()) return Rested::first_time;
+    rows_[i].woke_by = Woke::never;
     return way_since_woken(i) > moved_share * bed_.scales.diameter() ? Rested::moved : Rested::unmoved;
   }
 
@@ -103,7 +109,7 @@ class Survey {
   void tie(Proposal& proposal);
 
   /// What keeps this rank's exterior granules awake, at the end of a look. Local.
-  AwakeSteps count_awake(const Patience& patience, const Proposal& proposal) const;
+  AwakeSteps see_awake(const Patience& patience, const Proposal& proposal);
 
   /// Kinetic energy of what is exterior (J). Collective.
   double kinetic_energy_of_exterior() const;
@@ -120,6 +126,7 @@ class Survey {
   void begin_anew(int i) {
     rows_[i].calm = rows_[i].waited = 0;
     rows_[i].normal_load = Locked::not_known;
+    rows_[i].awake = Awake::count;
   }
   std::vector<Vec3> accelerations() const;
   void accelerate_clumps(std::vector<Vec3>& of_atoms) const;

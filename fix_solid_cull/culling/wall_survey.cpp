@@ -32,7 +32,7 @@ void WallSurvey::update(const std::vector<WallContact>& contacts, bool new_run) 
     const AtWall& then = rows_[i];
     // between runs a wall may have been taken away; within one, a wall that moves may have left
     const bool gone = new_run ? there[i] < then.touched : then.moves && there[i] == 0;
-    if (bed_.shell[i].locked && gone) bed_.wake.ask(atoms.place(i), 0.5 * atoms.radius[i]);
+    if (bed_.shell[i].locked && gone) bed_.wake.ask(atoms.place(i), 0.5 * atoms.radius[i], Woke::wall);
     rows_[i] = now[i];
   }
 }

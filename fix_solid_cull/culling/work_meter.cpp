@@ -10,6 +10,7 @@ void WorkMeter::begin_run(double in_fix) {
   in_fix_then_ = in_fix;
   restored_then_ = static_cast<double>(bed_.solid.ledger().granules_restored());
   in_vain_then_ = in_vain();
+  woken_then_ = bed_.solid.ledger().granules_woken();
 }
 
 double WorkMeter::in_vain() const {
@@ -46,15 +47,21 @@ void WorkMeter::see_awake(const AwakeSteps& now) {
   seen_to_ = work_.steps;
 }
 
+RunWork WorkMeter::now(double in_fix) const {
+  if (!runs_) return {};
+  RunWork now = work_;
+  now.seconds = std::chrono::duration<double>(Clock::now() - began_).count();
+  now.in_fix = in_fix - in_fix_then_;
+  now.restored = static_cast<double>(bed_.solid.ledger().granules_restored()) - restored_then_;
+  now.in_vain = in_vain() - in_vain_then_;
+  now.woken = bed_.solid.ledger().granules_woken();
+  now.woken.add(woken_then_, -1);
+  now.in_pairs = bed_.run.seconds_of_pair_forces();
+  return now;
+}
+
 RunWork WorkMeter::end_run(double in_fix) {
-  RunWork ended = runs_ ? work_ : RunWork();
-  if (runs_) {
-    ended.seconds = std::chrono::duration<double>(Clock::now() - began_).count();
-    ended.in_fix = in_fix - in_fix_then_;
-    ended.restored = static_cast<double>(bed_.solid.ledger().granules_restored()) - restored_then_;
-    ended.in_vain = in_vain() - in_vain_then_;
-    ended.in_pairs = bed_.run.seconds_of_pair_forces();
-  }
+  const RunWork ended = now(in_fix);
   before_ = so_far();
   work_ = {};
   runs_ = false;

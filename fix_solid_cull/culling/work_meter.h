@@ -21,7 +21,9 @@ class WorkMeter {
   void count_step(double in_fix);
   /// A look sees so many, by what keeps them awake: they stand for the steps since the look before.
   void see_awake(const AwakeSteps& now);
-  /// What was counted since the run began. The next one begins anew.
+  /// What was counted since the run began; nothing before its first step.
+  RunWork now(double in_fix) const;
+  /// Likewise; the next one begins anew.
   RunWork end_run(double in_fix);
   /// Granule-steps of all runs since the fix was made, this one too.
   RunWork so_far() const;
@@ -48,6 +50,7 @@ class WorkMeter {
   double in_fix_then_ = 0;   // s
   double seen_to_ = 0;       // steps of it that looks have seen
   double restored_then_ = 0, in_vain_then_ = 0;
+  WokenBy woken_then_;
   double seconds_ = 0, seconds_without_ = 0;
   int compared_ = 0;
   bool lists_are_new_ = true;

@@ -51,14 +51,40 @@ const char* words_for(Awake why) {
   return "";
 }
 
+const char* words_for(Woke by) {
+  switch (by) {
+    case Woke::load:
+      return "loads that changed";
+    case Woke::shaken:
+      return "their body was shaken";
+    case Woke::exposed:
+      return "exposed";
+    case Woke::wall:
+      return "a wall has gone";
+    case Woke::insertion:
+      return "new granules in their place";
+    case Woke::deck:
+      return "the deck, or a program";
+    case Woke::no_gain:
+      return "culling did not pay";
+    case Woke::lost:
+      return "parts of clumps that were lost";
+    case Woke::never:
+    case Woke::count:
+      break;
+  }
+  return "";
+}
+
 /// The main reasons, the first one first.
-std::string reasons(const AwakeSteps& awake) {
-  std::vector<Awake> by_size;
-  for (int k = 0; k < static_cast<int>(Awake::count); ++k) by_size.push_back(static_cast<Awake>(k));
-  std::stable_sort(by_size.begin(), by_size.end(), [&](Awake a, Awake b) { return awake[a] > awake[b]; });
+template <class Reason>
+std::string reasons(const ByReason<Reason>& numbers) {
+  std::vector<Reason> by_size;
+  for (int k = 0; k < static_cast<int>(Reason::count); ++k) by_size.push_back(static_cast<Reason>(k));
+  std::stable_sort(by_size.begin(), by_size.end(), [&](Reason a, Reason b) { return numbers[a] > numbers[b]; });
   std::string said;
   for (std::size_t k = 0; k < most_reasons; ++k) {
-    const double share = awake[by_size[k]] / awake.all();
+    const double share = numbers[by_size[k]] / numbers.all();
     if (share >= worth_telling) said += format("%s%s %.0f %%", said.empty() ? "" : ", ", words_for(by_size[k]), 100 * share);
   }
   return said;
@@ -89,9 +115,17 @@ std::string text_of(const RunSummary& run, const Settings& settings) {
   if (run.runs > 1 && run.seconds_without > 0) line("all runs", compared(run.times_less));
   const std::string awake = w.awake.all() > 0 ? reasons(w.awake) : "";
   if (!awake.empty()) line("kept awake", awake);
+  if (w.woken.all() > 0) line("woken by", reasons(w.woken) + format(", of %.0f", w.woken.all()));
   const std::string advice = advice_on(w, settings);
   if (!advice.empty()) line("advice", advice);
   return text;
+}
+
+std::string text_of(const Forecast& f, const RunWork& lately, const Settings& settings) {
+  std::string text = "if it goes on like this, the run will be " + compared(f.times_less) +
+                     format(": %.2g %% of the granules are exterior, %.2g %% move", 100 * f.awake, 100 * f.moving);
+  const std::string advice = advice_on(lately, settings);
+  return advice.empty() ? text : text + "; " + advice;
 }
 
 std::string advice_on(const RunWork& w, const Settings& settings) {

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "forecast.h"
 #include "run_work.h"
 #include "settings.h"
 
@@ -18,6 +19,9 @@ struct RunSummary {
 /// Lines, without the last one's end: the first says how long the run was, the others are indented. What is not known has no
 /// line.
 std::string text_of(const RunSummary& run, const Settings& settings);
+
+/// A forecast, in one line; `lately`: what it rests on.
+std::string text_of(const Forecast& f, const RunWork& lately, const Settings& settings);
 
 /// What would let more sleep, in words; empty where the counts do not show it.
 std::string advice_on(const RunWork& run, const Settings& settings);

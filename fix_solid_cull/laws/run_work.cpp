@@ -10,21 +10,28 @@ constexpr double fewest_atoms = 500, fewest_exterior = 100;  // mean, of the ran
 
 }  // namespace
 
+void RunWork::add(const RunWork& o, double times) {
+  steps += times * o.steps;
+  exterior += times * o.exterior;
+  interface += times * o.interface;
+  interior += times * o.interior;
+  pairs += times * o.pairs;
+  exterior_ends += times * o.exterior_ends;
+  seconds += times * o.seconds;
+  in_fix += times * o.in_fix;
+  in_pairs += times * o.in_pairs;
+  restored += times * o.restored;
+  in_vain += times * o.in_vain;
+  awake.add(o.awake, times);
+  woken.add(o.woken, times);
+}
+
 RunWork sum_of(const std::vector<RunWork>& ranks) {
   RunWork sum;
-  for (const RunWork& r : ranks) {
-    sum.steps = std::max(sum.steps, r.steps);
-    sum.seconds = std::max(sum.seconds, r.seconds);
-    sum.in_fix = std::max(sum.in_fix, r.in_fix);
-    sum.in_pairs = std::max(sum.in_pairs, r.in_pairs);
-    sum.exterior += r.exterior;
-    sum.interface += r.interface;
-    sum.interior += r.interior;
-    sum.pairs += r.pairs;
-    sum.exterior_ends += r.exterior_ends;
-    sum.restored += r.restored;
-    sum.in_vain += r.in_vain;
-    sum.awake.add(r.awake, 1);
+  for (const RunWork& r : ranks) sum.add(r, 1);
+  for (double RunWork::*of_all : {&RunWork::steps, &RunWork::seconds, &RunWork::in_fix, &RunWork::in_pairs}) {
+    sum.*of_all = 0;
+    for (const RunWork& r : ranks) sum.*of_all = std::max(sum.*of_all, r.*of_all);
   }
   return sum;
 }

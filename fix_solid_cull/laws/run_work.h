@@ -19,7 +19,10 @@ struct RunWork {
   double restored = 0;       ///< granules
   double in_vain = 0;        ///< granules that were culled again and had not moved since they were restored
   AwakeSteps awake;
+  WokenBy woken;  ///< granules
 
+  /// Each of them, so many times: +1 adds a run, -1 takes what came before.
+  void add(const RunWork& other, double times);
   double all() const { return exterior + interface + interior; }  ///< granule-steps
   double computed() const { return exterior + interface; }        ///< likewise, of the engine's atoms
   double mean(double granule_steps) const { return steps > 0 ? granule_steps / steps : 0; }

@@ -110,6 +110,10 @@ const std::map<std::string, Reader>& readers() {
          v.one_of("'short' or 'full'",
                   {{"short", [&] { s.report = ReportLength::brief; }}, {"full", [&] { s.report = ReportLength::full; }}});
        }},
+      {"reasons",
+       [](Values& v, Settings& s) {
+         v.one_of("'yes' or 'no'", {{"yes", [&] { s.reasons = true; }}, {"no", [&] { s.reasons = false; }}});
+       }},
       {"mesh",
        [](Values& v, Settings& s) {
          const int every = v.whole("a whole number of steps, 1 or more, and a file name", 1);

@@ -39,6 +39,7 @@ FixSolidCull::FixSolidCull(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg)
   try {
     if (!engine::why_not_live().empty()) throw InputError(engine::why_not_live());
     const Settings settings = parse_settings(std::vector<std::string>(arg + 3, arg + narg));
+    reasons_ = settings.reasons;
     rules_.refuse_what_was_set_up_wrongly();
     if (!atoms_.make_interface_group())
       throw InputError("all 32 groups are taken and interface granules need one: delete a group");
@@ -72,7 +73,7 @@ void FixSolidCull::publish_flags() {
   extscalar = 1;
   extvector = 0;
   peratom_flag = 1;
-  size_peratom_cols = 0;
+  size_peratom_cols = reasons_ ? static_cast<int>(Label().size()) : 0;
   peratom_freq = 1;
   force_reneighbor = 1;
   next_reneighbor = -1;
@@ -168,6 +169,7 @@ void FixSolidCull::setup_pre_force(int vflag) {
 
 void FixSolidCull::setup(int) {
   hand_on([&] { culling_->end_setup(); });
+  publish_labels();
 }
 
 // ------------------------------------------------------------------------------------------------------------ a time step
@@ -185,7 +187,7 @@ void FixSolidCull::post_integrate() {
 void FixSolidCull::pre_exchange() {
   bodies_have_changed();
   hand_on([&] { culling_->change(); });
-  vector_atom = culling_->labels();  // arrays may have been cut
+  publish_labels();  // arrays may have been cut
 }
 
 void FixSolidCull::pre_neighbor() {
@@ -210,6 +212,7 @@ void FixSolidCull::final_integrate() {
 
 void FixSolidCull::end_of_step() {
   hand_on([&] { culling_->write_outputs(); });
+  publish_labels();
 }
 
 void FixSolidCull::post_run() {
@@ -247,6 +250,7 @@ void FixSolidCull::show_bed_here() {
 void FixSolidCull::show_bed() {
   show_bed_here();
   hand_on([&] { culling_->finish_show(); });
+  publish_labels();
 }
 
 void FixSolidCull::lend_contacts() {
@@ -296,7 +300,7 @@ bool FixSolidCull::restore_all(const char* command) {
     return culling_->restore_all() > 0;
   });
   if (some && command) run_.say("'" + std::string(command) + "' may change which granules there are: all are exterior now");
-  vector_atom = culling_->labels();
+  publish_labels();
   return some;
 }
 
@@ -357,11 +361,24 @@ int FixSolidCull::max_type() {
 
 // ------------------------------------------------------------------------------------------------------------ per atom
 
+/// For dumps, and whatever reads f_ID of atoms. Arrays of the engine's room.
+void FixSolidCull::publish_labels() {
+  if (size_peratom_cols == 0) {
+    vector_atom = culling_->labels();
+    return;
+  }
+  label_rows_.resize(static_cast<std::size_t>(atom->nmax));
+  label_pointers_.resize(label_rows_.size());
+  for (int i = 0; i < atom->nlocal; ++i) label_rows_[i] = culling_->label_with_reasons(i);
+  std::transform(label_rows_.begin(), label_rows_.end(), label_pointers_.begin(), [](auto& row) { return row.data(); });
+  array_atom = label_pointers_.data();
+}
+
 void FixSolidCull::grow_arrays(int nmax) {
   guarded([&] {
     for (FollowsAtoms* f : culling_->followers()) f->grow(nmax);
   });
-  vector_atom = culling_->labels();
+  publish_labels();
 }
 
 void FixSolidCull::copy_arrays(int from, int to, int) {

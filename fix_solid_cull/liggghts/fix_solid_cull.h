@@ -101,6 +101,7 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   void refuse_value_of_atoms(const std::string& formula, const std::string& measured_by);
 
  private:
+  void publish_labels();
   /// What goes wrong ends in one line, not in a stack trace.
   template <class Work>
   auto guarded(Work work) -> decltype(work());
@@ -126,7 +127,9 @@ class FixSolidCull : public LAMMPS_NS::Fix, public InterfaceMeshSource {
   EngineMemory memory_;
   DeckRules rules_;
   std::unique_ptr<Culling> culling_;
-  bool in_run_ = false;
+  bool in_run_ = false, reasons_ = false;
+  std::vector<Label> label_rows_;  // of atoms, if they have reasons
+  std::vector<double*> label_pointers_;
   int show_ = 0;
   int write_error_ = 0;  // of the restart file's head
 };

@@ -16,6 +16,7 @@ namespace solidcull {
 
 void EngineRun::renew() {
   step = update->ntimestep - reset_by;
+  steps_left = update->laststep - update->ntimestep;
   dt = update->dt;
   skin = neighbor->skin;
   box = {vec(domain->boxlo), vec(domain->boxhi)};

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 
+#include "awake.h"
 #include "exact_sum.h"
 #include "granule_store.h"
 
@@ -28,6 +29,8 @@ class Ledger {
     ++restored_;
     energy_ += energy;
   }
+  /// A granule will be free again.
+  void woken(Woke by) { woken_[by] += 1; }
   /// What a granule gained in height and by overlaps because it was given another place (J).
   void refilled(double energy) { energy_ += energy; }
   void carved() { ++carves_; }
@@ -43,6 +46,7 @@ class Ledger {
 
   std::int64_t granules_locked() const { return locked_; }
   std::int64_t granules_restored() const { return restored_; }
+  const WokenBy& granules_woken() const { return woken_; }  ///< since the fix was made, in this program
   std::int64_t carves() const { return carves_; }
   std::int64_t granules_locked_again() const { return locked_again_; }
   std::int64_t granules_that_moved() const { return moved_; }  ///< of those
@@ -70,6 +74,7 @@ class Ledger {
 
   std::int64_t in_ = 0, out_ = 0, locked_ = 0, restored_ = 0, carves_ = 0, locked_again_ = 0, moved_ = 0;
   ExactSum mass_, energy_;
+  WokenBy woken_;
 };
 
 }  // namespace solidcull

@@ -204,6 +204,7 @@ class Solid {
   void count_locked() { ledger_.locked(); }
   void count_locked_again(bool moved) { ledger_.locked_again(moved); }
   void count_restored(double energy) { ledger_.restored(energy); }
+  void count_woken(Woke by) { ledger_.woken(by); }
   void count_refilled(double energy) { ledger_.refilled(energy); }
   void count_carves(std::size_t n) {
     for (; n > 0; --n) ledger_.carved();

@@ -119,7 +119,7 @@ struct BundleParts {
   }
   void wake_all() {
     Wakes all;
-    all.all = true;
+    all.all = Woke::deck;
     wake(all);
   }
   /// All bodies are elsewhere, a step later.

@@ -345,6 +345,12 @@ class SmallWorld {
  public:
   explicit SmallWorld(const SmallDeck& its_deck, Meeting* meeting = nullptr, int rank = 0, int rank_count = 1);
   SmallWorld(const SmallWorld&) = delete;
+  /// What some rank has, if one has. Collective.
+  Woke any_woke(Woke here) const {
+    double most = static_cast<double>(here);
+    ranks.largest(&most, 1);
+    return static_cast<Woke>(most);
+  }
 
   SmallDeck deck;
   SmallAtoms atoms;

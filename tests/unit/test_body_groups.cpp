@@ -103,7 +103,7 @@ TEST(BodyGroups, what_leaves_with_one_that_goes_back_has_the_motion_of_its_body)
         }
       EXPECT_FALSE(due.empty());
       Wakes all;
-      all.all = true;
+      all.all = Woke::deck;
       parts.change(all, {});
       for (const auto& [tag, velocity] : due) EXPECT_LE((w.atoms.velocity(w.at(tag)) - velocity).norm(), 1e-15) << tag;
       if (w.at(21) >= 0) {

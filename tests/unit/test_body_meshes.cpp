@@ -95,7 +95,7 @@ TEST(BodyMeshes, stay_as_they_are_while_they_are_held) {
   bar.parts.meshes.hold();
   const Vec3 x = bar.world.atoms.place(bar.world.at(50));
   Wakes all;
-  all.all = true;
+  all.all = Woke::deck;
   bar.parts.change(all, {});
   ASSERT_EQ(bar.bodies(), 0u);
   ASSERT_EQ(bar.parts.meshes.ask().size(), 1u);

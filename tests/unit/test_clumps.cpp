@@ -44,7 +44,7 @@ TEST(CulledClumps, locked_stored_and_freed_in_one_step_are_as_they_were_to_the_b
       if (some_stored) bundle.parts.put_away({1, 2, 3, 10, 11, 12, 22, 23, 24});
       EXPECT_EQ(world.atoms.owned, some_stored ? 16 : 25);
       Wakes all;
-      all.all = true;
+      all.all = Woke::deck;
       bundle.parts.change(all, {});
       const EngineState after(world);
       EXPECT_EQ(after.spheres, before.spheres);

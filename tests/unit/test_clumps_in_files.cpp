@@ -89,7 +89,7 @@ TEST(ClumpsInFiles, that_two_ranks_wrote_are_taken_up_by_any_number_of_ranks) {
         ++w.run
               .step;  // else those in the shell would have their own motions, which the file has, and the others that of the body
         Wakes all;
-        all.all = true;
+        all.all = Woke::deck;
         parts.bed.index.index(w.atoms);
         parts.change(all, {});
         parts.reneighbour();

@@ -255,7 +255,7 @@ TEST(Handover, what_was_put_away_a_little_beyond_a_border_waits) {
       EXPECT_EQ(parts.bed.solid.store().contains(41), w.ranks.me == 1);
       if (at_once) {
         Wakes all;
-        all.all = true;
+        all.all = Woke::deck;
         parts.change(all, {});
         if (w.ranks.me == 0) {
           EXPECT_EQ(w.atoms.velocity(w.at(31)), before);
@@ -495,7 +495,7 @@ TEST(Snapshot, what_was_stored_in_the_step_of_the_file_comes_back_with_the_motio
   file.read(w, parts);
   parts.reneighbour();
   Wakes all;
-  all.all = true;
+  all.all = Woke::deck;
   parts.bed.index.index(w.atoms);
   parts.change(all, {});
   ASSERT_EQ(w.atoms.owned, 4);

@@ -7,7 +7,7 @@
 namespace solidcull {
 namespace {
 
-StoredGranule granule(std::int64_t tag, const Vec3& position, double mass) {
+StoredGranule booked(std::int64_t tag, const Vec3& position, double mass) {
   StoredGranule g;
   g.tag = tag;
   g.position = position;
@@ -51,7 +51,7 @@ TEST(Ledger, agrees_with_the_store_through_a_million_moves) {
     if (there.size() < 500 || (there.size() < 1500 && random() % 2)) {
       const double x = at(random), y = at(random), z = at(random);
       there.push_back(next);
-      books.put(granule(next++, Vec3(x, y, z), mass(random)));
+      books.put(booked(next++, Vec3(x, y, z), mass(random)));
     } else {
       std::swap(there[random() % there.size()], there.back());
       books.take(there.back());
@@ -71,8 +71,8 @@ TEST(Ledger, agrees_with_the_store_through_a_million_moves) {
 
 TEST(Ledger, finds_a_granule_that_is_missing_from_the_store) {
   Books books;
-  books.put(granule(1, Vec3(0.1, 0, 0), 2e-6));
-  books.put(granule(2, Vec3(0, 0.2, 0), 3e-6));
+  books.put(booked(1, Vec3(0.1, 0, 0), 2e-6));
+  books.put(booked(2, Vec3(0, 0.2, 0), 3e-6));
   std::vector<double> record;
   books.store.take(2, record);
   EXPECT_DOUBLE_EQ(books.ledger.mass_error(books.store), -3e-6);
@@ -82,7 +82,7 @@ TEST(Ledger, finds_a_granule_that_is_missing_from_the_store) {
 
 TEST(Ledger, finds_a_granule_that_comes_back_changed) {
   Books books;
-  const StoredGranule g = granule(1, Vec3(0.1, 0, 0), 2e-6);
+  const StoredGranule g = booked(1, Vec3(0.1, 0, 0), 2e-6);
   books.put(g);
   std::vector<double> record;
   StoredGranule back = books.store.take(1, record);
@@ -93,8 +93,8 @@ TEST(Ledger, finds_a_granule_that_comes_back_changed) {
 
 TEST(Ledger, does_not_mind_a_granule_that_changes_its_body_and_its_place) {
   Books books;
-  books.put(granule(1, Vec3(0.1, 0, 0), 0.5));
-  books.put(granule(2, Vec3(0, 0.2, 0), 0.25));
+  books.put(booked(1, Vec3(0.1, 0, 0), 0.5));
+  books.put(booked(2, Vec3(0, 0.2, 0), 0.25));
   books.store.move(1, 7, Vec3(5, 5, 5));
   EXPECT_EQ(books.ledger.mass_error(books.store), 0.0);
   books.take(1);

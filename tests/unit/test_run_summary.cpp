@@ -96,6 +96,22 @@ TEST(RunSummary, tells_the_two_main_reasons_the_first_one_first) {
   EXPECT_FALSE(has(said_of(run), "held")) << "less than a tenth";
 }
 
+TEST(RunSummary, tells_what_woke_granules_and_how_many) {
+  EXPECT_FALSE(has(said_of(impact()), "woken by")) << "none was";
+  for (int k = 1; k < static_cast<int>(Woke::count); ++k) {
+    RunSummary run = impact();
+    run.work.woken[static_cast<Woke>(k)] = 7;
+    const std::string text = said_of(run);
+    EXPECT_TRUE(has(text, "\n  woken by      = ") && has(text, " 100 %, of 7")) << text;
+    EXPECT_FALSE(has(text, "=  100 %")) << "a reason without words: " << k;
+  }
+  RunSummary run = impact();
+  run.work.woken[Woke::load] = 880;
+  run.work.woken[Woke::wall] = 115;
+  run.work.woken[Woke::insertion] = 5;
+  EXPECT_TRUE(has(said_of(run), "woken by      = loads that changed 88 %, a wall has gone 12 %, of 1000")) << said_of(run);
+}
+
 // ------------------------------------------------------------------------------------------------------------- advice
 
 /// A run in which nothing limits.

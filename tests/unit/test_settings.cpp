@@ -53,6 +53,7 @@ void expect_same(const Settings& a, const Settings& b) {
   EXPECT_EQ(a.balance_every, b.balance_every);
   EXPECT_EQ(a.balance_threshold, b.balance_threshold);
   EXPECT_EQ(a.report, b.report);
+  EXPECT_EQ(a.reasons, b.reasons);
   EXPECT_EQ(listed(a.meshes), listed(b.meshes));
   EXPECT_EQ(listed(a.beds), listed(b.beds));
 }
@@ -82,6 +83,7 @@ TEST(Settings, without_keywords_are_the_defaults) {
   EXPECT_EQ(s.restore, Restore::exact);
   EXPECT_EQ(s.voxel, 0.5);
   EXPECT_EQ(s.report, ReportLength::brief);
+  EXPECT_FALSE(s.reasons);
   EXPECT_TRUE(s.meshes.empty());
   EXPECT_TRUE(s.beds.empty());
 }
@@ -101,11 +103,12 @@ TEST(Settings, every_keyword_is_parsed) {
   due.balance_every = 1000;
   due.balance_threshold = 1.2;
   due.report = ReportLength::full;
+  due.reasons = true;
   due.meshes = {{100, "out/mesh.*.vdb"}};
   due.beds = {{200, "bed.vtp"}};
   const std::string line =
       "every 40 depth 3.5 exterior live speed 1e-3 calm 5 tolerance 0.5 0.1 carve 1.5 6 store exact "
-      "restore exact voxel 0.25 balance 1000 1.2 report full mesh 100 out/mesh.*.vdb bed 200 bed.vtp";
+      "restore exact voxel 0.25 balance 1000 1.2 report full reasons yes mesh 100 out/mesh.*.vdb bed 200 bed.vtp";
   expect_same(parsed(line), due);
   std::set<std::string> named;
   for (const std::string& w : words(line)) named.insert(w);
@@ -147,6 +150,8 @@ TEST(Settings, the_limits_themselves_are_allowed) {
                            "speed 1e-9",
                            "report short",
                            "report full",
+                           "reasons yes",
+                           "reasons no",
                            "mesh 1 a.vdb",
                            "mesh 1 a.stl",
                            "mesh 1 a.vtp",
@@ -247,6 +252,7 @@ const Refusal refusals[] = {
      "more than 1"},
 
     {"report long", "keyword 'report' has the value 'long': give 'short' or 'full'"},
+    {"reasons maybe", "keyword 'reasons' has the value 'maybe': give 'yes' or 'no'"},
     {"report", "keyword 'report' ends too early: give 'short' or 'full'"},
 
     {"mesh 0 a.stl", "keyword 'mesh' has the value '0': give a whole number of steps, 1 or more, and a file name"},
@@ -267,11 +273,13 @@ const Refusal refusals[] = {
     {"depth 0.8 exterior live", "voxel 0.5 is too coarse for depth 0.8: choose voxel <= depth/2"},
 
     {"deptth 2",
-     "unknown keyword 'deptth': choose from balance, bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, "
+     "unknown keyword 'deptth': choose from balance, bed, calm, carve, depth, every, exterior, mesh, reasons, report, restore, "
+     "speed, "
      "store, "
      "tolerance, voxel"},
     {"calm 3 4",
-     "unknown keyword '4': choose from balance, bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, store, "
+     "unknown keyword '4': choose from balance, bed, calm, carve, depth, every, exterior, mesh, reasons, report, restore, speed, "
+     "store, "
      "tolerance, voxel"},
 };
 

@@ -9,9 +9,9 @@
 namespace solidcull {
 namespace {
 
-class Random {
+class RandomPlaces {
  public:
-  explicit Random(unsigned seed) : engine_(seed) {}
+  explicit RandomPlaces(unsigned seed) : engine_(seed) {}
   double between(double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(engine_); }
   Vec3 place(const Vec3& size) {
     const double x = between(-0.5, 0.5), y = between(-0.5, 0.5), z = between(-0.5, 0.5);
@@ -76,7 +76,7 @@ TEST(SphereCells, one_sphere_is_near_up_to_the_gap) {
 }
 
 TEST(SphereCells, any_near_answers_as_brute_force) {
-  Random random(1);
+  RandomPlaces random(1);
   for (const Vec3& size : {Vec3(1, 1, 1), Vec3(3, 1, 0.1), Vec3(1, 0, 0), Vec3(0, 0, 0)})
     for (const double cell : {0.02, 0.1, 5.0}) {
       const std::vector<Sphere> spheres = random.spheres(300, size, 0.005, 0.05);  // size ratio 10
@@ -97,7 +97,7 @@ TEST(SphereCells, any_near_answers_as_brute_force) {
 }
 
 TEST(SphereCells, any_near_asks_among_those_that_count_only) {
-  Random random(4);
+  RandomPlaces random(4);
   const std::vector<Sphere> spheres = random.spheres(300, Vec3(1, 1, 1), 0.005, 0.05);
   SphereCells cells;
   cells.build(spheres, 0.1);
@@ -125,7 +125,7 @@ TEST(SphereCells, nothing_is_near_by_a_gap_below_every_overlap) {
 }
 
 TEST(SphereCells, box_queries_give_each_sphere_in_the_box_once) {
-  Random random(2);
+  RandomPlaces random(2);
   for (const Vec3& size : {Vec3(1, 1, 1), Vec3(5, 0.5, 0.5), Vec3(1, 1, 0)}) {
     const std::vector<Sphere> spheres = random.spheres(400, size, 0.01, 0.02);
     SphereCells cells;
@@ -140,7 +140,7 @@ TEST(SphereCells, box_queries_give_each_sphere_in_the_box_once) {
 }
 
 TEST(SphereCells, a_visit_that_says_false_is_the_last) {
-  Random random(3);
+  RandomPlaces random(3);
   SphereCells cells;
   cells.build(random.spheres(100, Vec3::Ones(), 0.01, 0.02), 0.1);
   int visits = 0;

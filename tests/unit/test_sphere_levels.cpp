@@ -10,12 +10,12 @@
 namespace solidcull {
 namespace {
 
-struct Cloud {
+struct LevelCloud {
   std::vector<double> coordinates, radii;
   std::vector<const double*> centres;
 
   /// n spheres in a box of these edges; sizes spread evenly over so many decades below the largest radius.
-  Cloud(int n, double x, double y, double z, double largest, double decades, unsigned seed) {
+  LevelCloud(int n, double x, double y, double z, double largest, double decades, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> part(0, 1);
     for (int s = 0; s < n; ++s) {
@@ -31,7 +31,7 @@ struct Cloud {
   }
 };
 
-void expect_the_near_ones(const Cloud& cloud, double factor, double skin) {
+void expect_the_near_ones(const LevelCloud& cloud, double factor, double skin) {
   SphereLevels levels;
   levels.build(cloud.size(), cloud.centres.data(), cloud.radii.data(), factor, skin);
   long pairs = 0;
@@ -60,7 +60,7 @@ TEST(SphereLevels, nothing_is_near_in_no_spheres) {
 }
 
 TEST(SphereLevels, equal_spheres_have_one_level_and_find_their_neighbours) {
-  const Cloud cloud(800, 1, 1, 1, 0.05, 0, 1);
+  const LevelCloud cloud(800, 1, 1, 1, 0.05, 0, 1);
   SphereLevels levels;
   levels.build(cloud.size(), cloud.centres.data(), cloud.radii.data(), 1, 0.01);
   EXPECT_EQ(levels.levels(), 1u);
@@ -68,7 +68,7 @@ TEST(SphereLevels, equal_spheres_have_one_level_and_find_their_neighbours) {
 }
 
 TEST(SphereLevels, sizes_over_three_decades_find_their_neighbours) {
-  const Cloud cloud(1500, 1, 1, 1, 0.3, 3, 2);
+  const LevelCloud cloud(1500, 1, 1, 1, 0.3, 3, 2);
   SphereLevels levels;
   levels.build(cloud.size(), cloud.centres.data(), cloud.radii.data(), 1, 0);
   EXPECT_GE(levels.levels(), 9u);
@@ -77,12 +77,12 @@ TEST(SphereLevels, sizes_over_three_decades_find_their_neighbours) {
 }
 
 TEST(SphereLevels, flat_and_long_clouds_and_a_contact_factor) {
-  expect_the_near_ones(Cloud(900, 1, 1, 0, 0.05, 1, 3), 1.1, 0.002);
-  expect_the_near_ones(Cloud(900, 20, 0.1, 0.1, 0.05, 1, 4), 1.1, 0.002);
+  expect_the_near_ones(LevelCloud(900, 1, 1, 0, 0.05, 1, 3), 1.1, 0.002);
+  expect_the_near_ones(LevelCloud(900, 20, 0.1, 0.1, 0.05, 1, 4), 1.1, 0.002);
 }
 
 TEST(SphereLevels, a_far_sphere_does_not_hide_the_others) {
-  Cloud cloud(500, 1, 1, 1, 0.1, 0.5, 5);
+  LevelCloud cloud(500, 1, 1, 1, 0.1, 0.5, 5);
   cloud.coordinates[0] = 1e7;  // needs far more cells than are made
   expect_the_near_ones(cloud, 1, 0.01);
 }
@@ -90,7 +90,7 @@ TEST(SphereLevels, a_far_sphere_does_not_hide_the_others) {
 TEST(SphereLevels, places_that_are_no_numbers_lead_nowhere) {
   for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL})
     for (const int of : {0, 7}) {
-      Cloud cloud(20, 1, 1, 1, 0.1, 0.2, 5);
+      LevelCloud cloud(20, 1, 1, 1, 0.1, 0.2, 5);
       cloud.coordinates[static_cast<std::size_t>(3 * of + 1)] = bad;
       SphereLevels levels;
       levels.build(cloud.size(), cloud.centres.data(), cloud.radii.data(), 1, 0.01);

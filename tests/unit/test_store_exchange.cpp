@@ -63,7 +63,7 @@ struct Cluster {
   }
   void wake_all() {
     Wakes wakes;
-    wakes.all = true;
+    wakes.all = Woke::deck;
     parts.change(wakes, {});
   }
 

@@ -244,7 +244,7 @@ TEST(Survey, who_woke_and_stands_where_it_stood_must_be_calm_for_half_as_long) {
   bed.row(5, 2, Vec3(0, 0.1, 0));        // woke and has moved since, by 0.4 % of d
   bed.row(7, 2, Vec3(0, 0.15, 0), 0.1);  // woke, stands, and is hardly pressed: twice the half
   bed.begin();
-  for (int tag = 3; tag <= 8; ++tag) bed.parts.survey.note_wake(bed.world.at(tag));
+  for (int tag = 3; tag <= 8; ++tag) bed.parts.survey.note_wake(bed.world.at(tag), Woke::load);
   for (const int tag : {5, 6}) {
     const int i = bed.world.at(tag);
     bed.world.atoms.set_place(i, bed.world.atoms.place(i) + Vec3(0, 0, 0.004 * 2 * r));
@@ -419,8 +419,8 @@ TEST(Survey, exterior_granules_are_counted_with_their_energy) {
 // ------------------------------------------------------------------------------------------------------------- what is awake
 
 /// How many each reason keeps awake, as the last look saw it.
-AwakeSteps awake(const SurveyedBed& bed, int looks = looks_to_calm) {
-  return bed.parts.survey.count_awake({false, looks, 1}, bed.proposal);
+AwakeSteps awake(SurveyedBed& bed, int looks = looks_to_calm) {
+  return bed.parts.survey.see_awake({false, looks, 1}, bed.proposal);
 }
 
 TEST(Awake, each_exterior_granule_has_one_reason) {
@@ -489,11 +489,47 @@ TEST(Awake, woken_and_still_there_is_awake_in_vain) {
   SurveyedBed bed;
   bed.row(1, 3, Vec3::Zero());
   bed.begin();
-  bed.parts.survey.note_wake(bed.world.at(1));
-  bed.parts.survey.note_wake(bed.world.at(2));
+  bed.parts.survey.note_wake(bed.world.at(1), Woke::load);
+  bed.parts.survey.note_wake(bed.world.at(2), Woke::load);
   bed.parts.survey.rows()[bed.world.at(2)].woke_at += Vec3(0, 0, 0.02 * 2 * r);
   bed.look();
   EXPECT_EQ(awake(bed).in_vain, 1);
+}
+
+TEST(Awake, a_granule_knows_its_reasons_and_takes_them_along) {
+  SurveyedBed bed;
+  bed.row(1, 3, Vec3::Zero());
+  bed.row(4, 1, Vec3(0, 0.1, 0));
+  bed.begin();
+  const auto of = [&](int tag) { return bed.parts.survey[bed.world.at(tag)]; };
+  EXPECT_EQ(of(4).awake, Awake::count) << "no look has seen it";
+  bed.look();
+  awake(bed);
+  EXPECT_EQ(of(4).awake, Awake::alone);
+  EXPECT_EQ(of(1).awake, Awake::settling);
+  EXPECT_EQ(of(1).woke_by, Woke::never);
+  bed.parts.survey.note_wake(bed.world.at(1), Woke::exposed);
+  EXPECT_EQ(of(1).awake, Awake::count) << "no look has seen it since";
+  EXPECT_EQ(of(1).woke_by, Woke::exposed);
+  bed.look();
+  awake(bed);
+  for (const int tag : {1, 2, 4}) {
+    double packed[AtRest::packed_size];
+    of(tag).pack(packed);
+    const AtRest there = AtRest::unpack(packed);
+    EXPECT_EQ(there.awake, of(tag).awake) << tag;
+    EXPECT_EQ(there.woke_by, of(tag).woke_by) << tag;
+  }
+  for (int why = 0; why <= static_cast<int>(Awake::count); ++why)
+    for (int by = 0; by < static_cast<int>(Woke::count); ++by) {
+      AtRest a;
+      a.awake = static_cast<Awake>(why);
+      a.woke_by = static_cast<Woke>(by);
+      double packed[AtRest::packed_size];
+      a.pack(packed);
+      const AtRest b = AtRest::unpack(packed);
+      EXPECT_TRUE(b.awake == a.awake && b.woke_by == a.woke_by) << why << " " << by;
+    }
 }
 
 }  // namespace

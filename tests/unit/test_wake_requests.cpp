@@ -20,15 +20,15 @@ SmallDeck box(std::array<int, 3> split) {
 
 constexpr double margin = 3 * d;
 
-Wakes take(WakeRequests& wake, const SmallWorld& w) { return wake.take(w.ranks, law, w.ranks.any(wake.asks_all()), margin); }
+Wakes take(WakeRequests& wake, const SmallWorld& w) { return wake.take(w.ranks, law, w.any_woke(wake.asks_all()), margin); }
 
 TEST(WakeRequests, every_rank_gets_the_balls_that_reach_what_it_may_hold) {
   run_on_ranks(box({3, 1, 1}), [](SmallWorld& w) {
     WakeRequests wake;
     EXPECT_FALSE(wake.any_here());
     if (w.ranks.me == 0) {
-      wake.ask(Vec3(0.1, 0, 0), 0.01);
-      wake.ask(Vec3(0.32, 0, 0), 0.02);  // near the border at a third
+      wake.ask(Vec3(0.1, 0, 0), 0.01, Woke::load);
+      wake.ask(Vec3(0.32, 0, 0), 0.02, Woke::wall);  // near the border at a third
       wake.ask_body(7);
       wake.ask_body(7);
       EXPECT_TRUE(wake.asks_body(7));
@@ -40,9 +40,11 @@ TEST(WakeRequests, every_rank_gets_the_balls_that_reach_what_it_may_hold) {
     if (w.ranks.me < 2) {
       EXPECT_EQ(here.balls.back().radius, 0.02);
       EXPECT_EQ(here.balls.back().centre, Vec3(0.32, 0, 0));
+      EXPECT_EQ(here.in_balls(Vec3(0.33, 0, 0)), Woke::wall);
+      EXPECT_EQ(here.in_balls(Vec3(0.35, 0, 0)), Woke::never);
     }
     EXPECT_EQ(here.wakes_body(7), w.ranks.me == 0);  // numbers are those of the rank
-    EXPECT_FALSE(here.all);
+    EXPECT_FALSE(here.wakes_all());
     EXPECT_EQ(here.none(), w.ranks.me == 2);
     // and they are empty afterwards
     EXPECT_FALSE(wake.any_here());
@@ -56,7 +58,7 @@ TEST(WakeRequests, balls_have_their_periodic_images_which_count_as_no_carves) {
   deck.periodic = {true, true, false};
   run_on_ranks(deck, [](SmallWorld& w) {
     WakeRequests wake;
-    if (w.ranks.me == 1) wake.ask(Vec3(0.99, 0.01, 1.5), 0.1);
+    if (w.ranks.me == 1) wake.ask(Vec3(0.99, 0.01, 1.5), 0.1, Woke::load);
     const Wakes all = take(wake, w);
     EXPECT_EQ(all.carves, w.ranks.me == 1 ? 1u : 0u);
     EXPECT_EQ(all.balls.size(), 2u);  // both ranks have what is at the other side of y, rank 0 through the side of x
@@ -77,15 +79,15 @@ TEST(WakeRequests, balls_are_larger_where_many_wake_beside_each_other_on_whateve
     WakeRequests wake;
     const Vec3 front(0.5, 1, 1);
     if (w.ranks.me == 0) {
-      wake.ask_by_load(front, 0.011);
-      wake.ask_by_load(front - Vec3(2.5 * d, 0, 0), 0.012);
-      wake.ask_by_load(Vec3(0.1, 1, 1), 0.013);                  // alone
-      for (int k = 0; k < 9; ++k) wake.ask(Vec3(0.1, 1, 1), d);  // not by their loads
+      wake.ask(front, 0.011, Woke::load);
+      wake.ask(front - Vec3(2.5 * d, 0, 0), 0.012, Woke::load);
+      wake.ask(Vec3(0.1, 1, 1), 0.013, Woke::load);                          // alone
+      for (int k = 0; k < 9; ++k) wake.ask(Vec3(0.1, 1, 1), d, Woke::wall);  // not by their loads
     } else {
-      wake.ask_by_load(front + Vec3(0, d, 0), 0.014);
-      wake.ask_by_load(front - Vec3(0, d, 0), 0.015);
-      wake.ask_by_load(front + Vec3(2.5 * d, 0, 0), 0.016);  // three are within 3 d, the fourth is not
-      wake.ask_by_load(front + Vec3(5 * d, 0, 0), 0.017);    // one is
+      wake.ask(front + Vec3(0, d, 0), 0.014, Woke::load);
+      wake.ask(front - Vec3(0, d, 0), 0.015, Woke::load);
+      wake.ask(front + Vec3(2.5 * d, 0, 0), 0.016, Woke::load);  // three are within 3 d, the fourth is not
+      wake.ask(front + Vec3(5 * d, 0, 0), 0.017, Woke::load);    // one is
     }
     std::map<double, double> larger;
     std::vector<Asked> rows;
@@ -104,11 +106,11 @@ TEST(WakeRequests, who_asks_for_many_wakes_what_touches_them) {
     WakeRequests wake;
     wake.ask_many(w.ranks, {Vec3(0.5, 1, 1)}, law, 100);
     const Wakes wakes = take(wake, w);
-    EXPECT_FALSE(wakes.all);
+    EXPECT_FALSE(wakes.wakes_all());
     EXPECT_TRUE(wakes.in_ball(Vec3(0.5 + 1.2 * d, 1, 1), 0));
     EXPECT_FALSE(wakes.in_ball(Vec3(0.5 + 2.1 * d, 1, 1), 0));
     wake.ask_many(w.ranks, {Vec3(0.5, 1, 1)}, law, 3);
-    EXPECT_TRUE(take(wake, w).all) << "a third of what is locked";
+    EXPECT_EQ(take(wake, w).all, Woke::deck) << "a third of what is locked";
   });
 }
 
@@ -117,7 +119,7 @@ TEST(WakeRequests, a_front_goes_on_through_periodic_sides) {
   deck.periodic = {true, false, false};
   run_on_ranks(deck, [](SmallWorld& w) {
     WakeRequests wake;
-    for (const double x : {0.002, 0.012, 0.988, 0.998}) wake.ask_by_load(Vec3(x, 1, 1), d);
+    for (const double x : {0.002, 0.012, 0.988, 0.998}) wake.ask(Vec3(x, 1, 1), d, Woke::load);
     for (const Ball& b : take(wake, w).balls) EXPECT_EQ(b.radius, 2 * d) << b.centre.transpose();
   });
 }
@@ -125,10 +127,10 @@ TEST(WakeRequests, a_front_goes_on_through_periodic_sides) {
 TEST(WakeRequests, all_is_for_all_ranks_whoever_asked) {
   run_on_ranks(box({2, 1, 1}), [](SmallWorld& w) {
     WakeRequests wake;
-    if (w.ranks.me == 1) wake.ask_all();
+    if (w.ranks.me == 1) wake.ask_all(Woke::no_gain);
     EXPECT_FALSE(wake.any_here());  // no granule, no body: no rebuild of its own
-    EXPECT_TRUE(take(wake, w).all);
-    EXPECT_FALSE(take(wake, w).all);
+    EXPECT_EQ(take(wake, w).all, Woke::no_gain);
+    EXPECT_FALSE(take(wake, w).wakes_all());
   });
 }
 

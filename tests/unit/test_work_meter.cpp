@@ -78,16 +78,20 @@ TEST(WorkMeter, knows_what_came_back_in_vain_in_this_run) {
   row.cull();
   row.parts.meter.begin_run(0);
   Wakes all;
-  all.all = true;
+  all.all = Woke::deck;
   row.parts.change(all, {});
   ++row.world.run.step;
   row.parts.reneighbour();
   row.parts.lock({5, 6});
   const RunWork w = row.after(1);
   EXPECT_EQ(w.restored, 4);
+  EXPECT_EQ(w.woken[Woke::deck], 4);
+  EXPECT_EQ(w.woken.all(), 4);
   EXPECT_EQ(w.in_vain, 2) << "of four two were culled again, and had not moved";
   row.parts.meter.begin_run(0);
-  EXPECT_EQ(row.after(1).restored, 0);
+  const RunWork next = row.after(1);
+  EXPECT_EQ(next.restored, 0);
+  EXPECT_EQ(next.woken.all(), 0);
 }
 
 TEST(WorkMeter, runs_that_could_be_compared_make_one_ratio) {

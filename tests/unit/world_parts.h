@@ -65,7 +65,7 @@ struct WorldParts : CullingParts {
     return some;
   }
   /// All that wakes. Collective.
-  Wakes wakes() { return bed.take_wakes(world.ranks.any(bed.wake.asks_all())); }
+  Wakes wakes() { return bed.take_wakes(world.any_woke(bed.wake.asks_all())); }
   /// Owned granules with these tags are locked; what of them touches is one body. Collective.
   void lock(const std::vector<std::int64_t>& tags) {
     Proposal p;
