@@ -51,8 +51,8 @@ class Column:
 
     def write(self, data, floor):
         places = self.places(self.granules)
-        data.write_text(f"column\n\n{self.granules} atoms\n1 atom types\n\n-0.01 0.01 xlo xhi\n-0.01 0.01 ylo yhi\n-0.001 {places[-1] + 0.02:g} zlo zhi\n\nAtoms\n\n"
-                        + "".join(f"{k + 1} 1 {DIAMETER:.17g} {DENSITY} 0 0 {z:.17g}\n" for k, z in enumerate(places)))
+        data.write_text(f"column\n\n{self.granules} atoms\n1 atom types\n\n-0.01 0.01 xlo xhi\n-0.01 0.01 ylo yhi\n"
+                        f"-0.001 {places[-1] + 0.02:g} zlo zhi\n\nAtoms\n\n" + "".join(f"{k + 1} 1 {DIAMETER:.17g} {DENSITY} 0 0 {z:.17g}\n" for k, z in enumerate(places)))
         meshes.write_stl(floor, meshes.grid((-0.01, -0.01, 0), (0.02, 0, 0), (0, 0.02, 0), 1, 1))
 
 
@@ -86,7 +86,8 @@ def figures(column, found):
     for phase, of in found.items():
         granules = column.granules + (phase != "asleep")
         due = column.due(granules)
-        report[phase] = {"contacts": float(np.abs(of["contacts"] / due - 1).max()), "contacts in weights": float(np.abs(of["contacts"] - due).max() / column.weight),
+        report[phase] = {"contacts": float(np.abs(of["contacts"] / due - 1).max()),
+                         "contacts in weights": float(np.abs(of["contacts"] - due).max() / column.weight),
                          "floor": float(abs(of["floor"][-1] / due[0] - 1)), "granules": granules, "interior": int(of["interior"])}
     # in the row of its step 0 LIGGGHTS counts the load of a mesh twice
     report["asleep"]["floor, at any step"] = float(np.abs(found["asleep"]["floor"][1:] / (column.granules * column.weight) - 1).max())

@@ -142,9 +142,10 @@ def integrated(pairs, slips, spins):
     """The law, step by step: velocities (along the blow, across) and spin that each of both has gained, as an array (pairs, 2, 3). `slips`:
     speed of the first across, beside the second. `spins`: of both (1/s). The first comes from the side of larger x."""
     n = len(pairs)
-    of = {name: np.array([getattr(p, name) for p in pairs]) for name in ("shear_modulus", "radius", "stiffness", "damping_ratio", "friction", "mass", "speed", "duration")}
-    radii, by_mass, by_inertia = (np.array([[1 / v if name != "radii" else (v if math.isfinite(v) else 0) for v in getattr(p, name)] for p in pairs])
-                                  for name in ("radii", "masses", "inertias"))
+    names = ("shear_modulus", "radius", "stiffness", "damping_ratio", "friction", "mass", "speed", "duration")
+    of = {name: np.array([getattr(p, name) for p in pairs]) for name in names}
+    radii = np.array([[r if math.isfinite(r) else 0 for r in p.radii] for p in pairs])
+    by_mass, by_inertia = (np.array([[1 / v for v in getattr(p, name)] for p in pairs]) for name in ("masses", "inertias"))
     damping = 2 * of["damping_ratio"] * np.sqrt(1.25 * of["stiffness"] * of["mass"])
     wall = np.array([not math.isfinite(p.radii[1]) for p in pairs])
     reach = radii.sum(axis=1)

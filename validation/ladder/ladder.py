@@ -24,30 +24,46 @@ HEAD = "[The page](README.md) says what each rung is. Made by `validation/ladder
 OUT, PAGE = HERE / "out", HERE / "RESULTS.md"
 
 
+def page_of(reports):
+    page = pages.Page()
+    page.heading(1, "ladder: as measured")
+    page.text(HEAD)
+    for name, report in reports.items():
+        RUNGS[name].page(report, page)
+    return page.markdown()
+
+
+def publish():
+    """The tables of all rungs, as they were climbed last."""
+    files = {name: OUT / f"{name}.json" for name in RUNGS}
+    missing = [name for name, file in files.items() if not file.exists()]
+    if missing:
+        raise errors.RunError(f"nothing is published before all rungs were climbed in full; still to do: {' '.join(missing)}")
+    made = PAGE.with_suffix(".part")
+    made.write_text(page_of({name: json.loads(file.read_text()) for name, file in files.items()}))
+    made.replace(PAGE)
+
+
 def main(argv=None):
     p = argparse.ArgumentParser(prog="ladder.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("rungs", nargs="*", metavar="RUNG", help=", ".join(RUNGS))
-    p.add_argument("--few-steps", action="store_true", help="fewer blows, a short column and a small silo")
-    p.add_argument("--publish", action="store_true", help="leave the tables in RESULTS.md; not with --few-steps, nor some rungs alone")
+    how = p.add_mutually_exclusive_group()
+    how.add_argument("--few-steps", action="store_true", help="fewer blows, a short column and a small silo")
+    how.add_argument("--publish", action="store_true", help="leave the tables of all rungs, as they were climbed last, in RESULTS.md")
     settings = p.parse_args(argv)
-    if settings.publish and (settings.few_steps or settings.rungs):
-        p.error("--publish is of all rungs in full")
     for name in settings.rungs:
         if name not in RUNGS:
             raise errors.RunError(f"no rung {name}; there is: {' '.join(RUNGS)}")
     place = OUT / "few" if settings.few_steps else OUT
     place.mkdir(parents=True, exist_ok=True)
-    page, wrong = pages.Page(), []
-    page.heading(1, "ladder: as measured")
-    page.text(HEAD)
+    reports = {}
     for name in settings.rungs or RUNGS:
-        report = RUNGS[name].climb(place, settings.few_steps)
+        report = reports[name] = json.loads(json.dumps(RUNGS[name].climb(place, settings.few_steps)))
         (place / f"{name}.json").write_text(json.dumps(report, indent=1) + "\n")
-        RUNGS[name].page(report, page)
-        wrong += report["wrong"]
-    print(page.markdown())
+        print(page_of({name: report}).partition(HEAD)[2].strip(), end="\n\n", flush=True)
     if settings.publish:
-        PAGE.write_text(page.markdown())
+        publish()
+    wrong = [line for report in reports.values() for line in report["wrong"]]
     for line in wrong:
         print(f"NOT AS IT MUST BE: {line}")
     return 1 if wrong else 0
