@@ -52,7 +52,8 @@ class Column:
     def write(self, data, floor):
         places = self.places(self.granules)
         data.write_text(f"column\n\n{self.granules} atoms\n1 atom types\n\n-0.01 0.01 xlo xhi\n-0.01 0.01 ylo yhi\n"
-                        f"-0.001 {places[-1] + 0.02:g} zlo zhi\n\nAtoms\n\n" + "".join(f"{k + 1} 1 {DIAMETER:.17g} {DENSITY} 0 0 {z:.17g}\n" for k, z in enumerate(places)))
+                        f"-0.001 {places[-1] + 0.02:g} zlo zhi\n\nAtoms\n\n" + "".join(
+                            f"{k + 1} 1 {DIAMETER:.17g} {DENSITY} 0 0 {z:.17g}\n" for k, z in enumerate(places)))
         meshes.write_stl(floor, meshes.grid((-0.01, -0.01, 0), (0.02, 0, 0), (0, 0.02, 0), 1, 1))
 
 

@@ -52,7 +52,8 @@ def run(kind, balls, dt, place):
     steps = math.ceil(1.5 * max(b.rolls_after for b in balls) / dt)
     text = ladder_runs.run("rolling.in", kind == KINDS[1], base, place, {
         "data": data, "floor": floor, "moves": moves, "way": way, "rolls": rolls, "young": YOUNG, "poisson": POISSON, "friction": FRICTION,
-        "gravity": GRAVITY, "skin": DIAMETER / 10, "dt": dt, "rest": round(REST * DT / dt), "steps": steps, "every": EVERY, "culling": "exterior sleep"})
+        "gravity": GRAVITY, "skin": DIAMETER / 10, "dt": dt, "rest": round(REST * DT / dt), "steps": steps, "every": EVERY,
+        "culling": "exterior sleep"})
     first = [t for t in logs.parse_log(text) if t.counted][0]
     stored = first.column("f_cull[3]")
     _, _, rows = next(dumps.snapshots(rolls))
