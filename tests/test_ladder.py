@@ -170,11 +170,11 @@ class Bars(unittest.TestCase):
 
     def test_each_bar_of_rolling_balls(self):
         good = {"balls": 4, "stored": [3, 3], "same": [1e-14, 1e-14], "closed": [
-            {"speed": 1e-12, "spin": 1e-12, "time": 0.08, "way": 0.09}, {"speed": 1e-12, "spin": 1e-12, "time": 0.02, "way": 0.024}]}
+            {"speed": 1e-12, "spin": 1e-12, "time": 0.008, "way": 0.009}, {"speed": 1e-12, "spin": 1e-12, "time": 0.002, "way": 0.0024}]}
         self.assertEqual(rolling.faults(good), [])
         for change in ({"stored": [3, 2]}, {"same": [1e-14, 1e-11]}):
             self.assertEqual(len(rolling.faults({**good, **change})), 1)
-        for name, value in (("speed", 1e-5), ("spin", 1e-5), ("time", 0.025), ("way", 0.029)):
+        for name, value in (("speed", 1e-5), ("spin", 1e-5), ("time", 0.011), ("way", 0.011)):
             spoiled = copy.deepcopy(good)
             spoiled["closed"][1][name] = value
             self.assertEqual(len(rolling.faults(spoiled)), 1, name)
