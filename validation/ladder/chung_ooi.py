@@ -1,4 +1,4 @@
-"""The blows of Chung & Ooi (2011), with the parameters that the authors of Yade and PySPH published with their decks of these tests."""
+"""The blows of Chung & Ooi (2011). Parameters of tests 1 to 5, 7 and 8 are those of published Yade and PySPH decks; 6 has the materials of 7."""
 import dataclasses
 import math
 
