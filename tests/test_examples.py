@@ -287,6 +287,26 @@ class Validation(Scripts):
         for what in ("rise", "arrival", "back"):
             self.assertLess(abs(strong["culled"][what] / strong["unculled"][what] - 1), 0.05, what)
 
+    def test_ladder(self):
+        """The script itself ends with 1 where a bar is missed; what it must not have left out, and what no run with the line may change."""
+        few = ROOT / "validation" / "ladder" / "out" / "few"
+        shutil.rmtree(few, ignore_errors=True)
+        self.run_script(few.parents[1] / "ladder.py")
+        impacts, rolling, column, silo = (json.loads((few / f"{name}.json").read_text()) for name in ("impacts", "rolling", "column", "silo"))
+        self.assertEqual(list(impacts["tests"]), ["1", "2", "3", "4", "5", "6", "7", "8", "no slip"])
+        for name, test in impacts["tests"].items():
+            with self.subTest(test=name):
+                self.assertEqual(test["free"], 0)
+                self.assertGreater(test["culled"], 0, "nothing was locked when it was struck")
+                self.assertLess(test["culled"], 0.01)
+                self.assertEqual(len(test["law"]), 2 if name in ("1", "3", "5", "no slip") else 1)
+        self.assertEqual([name for name, test in impacts["tests"].items() if "keen" in test], ["1", "4", "7"])
+        self.assertLess(impacts["tests"]["1"]["closed"][1]["duration"], 1e-5)
+        self.assertEqual(rolling["stored"], [1, 1])
+        self.assertEqual([phase["interior"] for phase in column["kinds"]["asleep"].values()], [8, 10, 0])
+        for runs in silo["runs"].values():
+            self.assertEqual([stage["granules"] for of in runs for stage in of], [40, 80])
+
     def test_activity(self):
         few = ROOT / "validation" / "activity" / "out" / "few"
         # asleep, so that the small beds, a few granules high, are culled at all
@@ -415,6 +435,10 @@ class Spoiled(Scripts):
 
     def test_a_granule_that_is_lost(self):
         self.assertIn("motion: drop-flat, few steps: culled-1 ended with 255 granules of 255 ids, not 256", self.spoiled(lose=True))
+
+    def test_a_target_that_is_not_locked(self):
+        self.assertIn("ladder: 1-culled-100.states: at step 20 the target of station 2 is 0.0, not as 'restored' says",
+                      self.spoiled(r"""deck = re.sub("(?m)^(fix cull .*)$", r"\1 every 1000000", deck)""", suite="ladder", scene="impacts"))
 
     def test_stress_tells_a_lost_granule(self):
         self.assertIn("stress: sway, few steps: live ended with 149 granules of 149 ids, not 150", self.spoiled(lose=True, suite="stress", scene="sway"))
