@@ -3,8 +3,9 @@
 The limits are `tolerance` (both numbers) and `speed`. Half of them turn an error e into r e. So the difference D of the two is e (1 - r),
 and e = D/(1 - r). Three things are not known:
 
-- r. Where the error goes as limits^p, r = 2^-p. Which granules sleep is also a matter of chance, and so is the sign of an error: half the
-  limits may turn it round, r = -2^-p, or let it grow, r = 2^p. Each of the three is taken to be as likely, and p to be anywhere in EXPONENTS.
+- r. Where the error goes as limits^p, r = 2^-p. That is taken for half of all cases. Which granules sleep is also a matter of chance, and
+  so is the sign of an error: half the limits may turn it round, r = -2^-p, or let it grow, r = 2^p, a quarter of cases each. p may be anywhere
+  in EXPONENTS: the least stands for errors that the limits hardly change.
 - D, but for the scatter of the runs: Student's t about what was measured.
 - What chance does to all runs with the same limits alike. So the limits of each run are a little other ones, see VARIED.
 
@@ -25,12 +26,12 @@ from .errors import RunError
 
 KINDS = {"culled": 1, "halved": 0.5}  # share of the limits
 DEFAULTS = {"tolerance": ("3", "0"), "speed": ("0.01",)}  # of fix solid/cull, where the deck gives none
-EXPONENTS = (0.5, 1.5)
+EXPONENTS = (0.1, 1.5)
 VARIED = (1, 1.2, 1 / 1.2, 1.1, 1 / 1.1, 1.15, 1 / 1.15, 1.05, 1 / 1.05, 1.25)  # the limits of each run, over those meant
 LEVEL = 0.9
 EACH = 4
-HALVED = 2.0**-np.linspace(*EXPONENTS, 67)
-FACTORS = np.concatenate([1 / (1 - r) for r in (HALVED, -HALVED, 1 / HALVED)])  # e/D
+HALVED = 2.0**-np.linspace(*EXPONENTS, 100)
+FACTORS = np.concatenate([1 / (1 - r) for r in (HALVED, HALVED, -HALVED, 1 / HALVED)])  # e/D
 MIDDLE = float(np.median(FACTORS))
 
 
@@ -161,4 +162,4 @@ def table(result):
                       f"scatter      standard deviation of single runs, whose limits are {min(VARIED):.2f} to {max(VARIED):.2f} times those meant",
                       f"error        of the culled runs, told without one that is not: {MIDDLE:.2g} times the difference",
                       f"between      in {100 * LEVEL:.0f} of 100 cases, if half the limits leave {min(HALVED):.0%} to {max(HALVED):.0%} of the error, or turn its sign, or let",
-                      "             it grow as much. What half the limits leave as it is they do not show"])
+                      "             it grow as much. An error that half the limits leave as it is they do not show"])

@@ -4,6 +4,7 @@ data/validation_result.json is the result of `validation/run.sh --quick slow_imp
 """
 import collections
 import contextlib
+import importlib.util
 import json
 import math
 import os
@@ -302,6 +303,41 @@ class Sequential(unittest.TestCase):
         missing = {k: x for k, x in culled.items() if k != 1}
         self.assertEqual(verdicts.in_looks(unculled, {k: missing[k] for k in sorted(missing)[:4]}, lambda mean: 2.0).pairs, 4, "a run that failed")
         self.assertRaises(ValueError, verdicts.in_looks, {0: 1.0, 1: 2.0}, {1: 1.0}, abs)
+
+
+class Halving(unittest.TestCase):
+    """What is kept of validation/halving: the page is made of the values, and as it claims."""
+
+    @classmethod
+    def setUpClass(cls):
+        spec = importlib.util.spec_from_file_location("validation_halving", ROOT / "validation" / "halving" / "halving.py")
+        cls.script = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(cls.script)
+        cls.folder = ROOT / "validation" / "halving"
+        cls.records = json.loads((cls.folder / "results.json").read_text())
+
+    def test_the_page_is_made_of_the_values(self):
+        text = (self.folder / "RESULTS.md").read_text()
+        self.assertEqual(pages.between_marks(self.folder / "RESULTS.md", self.script.BEGIN, self.script.text_of(self.records)), text)
+
+    def test_true_errors_are_held(self):
+        """In at least four scenes that it was not made for."""
+        found = self.script.compared(self.records, self.script.HELD_OUT)
+        self.assertGreaterEqual(len({c.scene for c in found}), 4)
+        self.assertGreaterEqual(len(found), 12)
+        held, narrow, _ = self.script.as_claimed(found)
+        self.assertGreaterEqual(held, self.script.LEAST_HELD * len(found))
+        self.assertGreaterEqual(narrow, 0.9 * len(found))
+
+    def test_an_error_that_half_the_limits_leave_is_not_held(self):
+        """The comparison can fail."""
+        record = {"scene": "impact", "metric": "m", "unculled": [0.0, 0.1, -0.1], "varied": [9.0, 9.1, 8.9], "halved": [9.0, 9.1, 8.9]}
+        c = self.script.Compared(record)
+        self.assertFalse(c.held)
+        self.assertEqual(self.script.as_claimed([c] * 4), (0, 4, False))
+        wide = self.script.Compared({**record, "varied": [1.0, 1.1, 0.9], "halved": [-9.0, -9.1, -8.9]})
+        self.assertTrue(wide.held and wide.width > self.script.WIDEST)
+        self.assertFalse(self.script.as_claimed([wide])[2])
 
 
 class Deciding(unittest.TestCase):

@@ -24,8 +24,12 @@ from solidcull_runs.validation import case_runs, cases, pages, short_cases  # no
 from solidcull_runs.validation.points import SLEEP, UNCULLED, Point  # noqa: E402
 
 OUT = HERE / "out"
-TUNED = ("slow_impact", "trapdoor")
-HELD_OUT = ("retaining_wall", "fed_heap", "lowered_block", "blade_drag", "impact", "point_load")
+TUNED = ("slow_impact", "trapdoor", "impact")
+HELD_OUT = ("retaining_wall", "silo", "gravity_switch", "point_load")
+SIZES = {"impact": {"granules": 2001, "bed_granules": 2000, "L": 0.03, "steps": 2000},  # where they are not those of --quick
+         "silo": {"granules": 2000, "bed_granules": 2000, "L": 0.1, "high": 0.25},
+         "gravity_switch": {"granules": 2000, "bed_granules": 2000, "L": 0.072, "W": 0.072},
+         "point_load": {"granules": 2000, "bed_granules": 2000, "L": 0.072, "W": 0.072}}
 LINE = ["fix cull all solid/cull"]  # of each case's deck: without keywords
 SHARES = {UNCULLED: None, "varied": 1, "halved": 0.5}  # of the limits; varied: from run to run, as --halve does
 RUNS = {UNCULLED: 5, "varied": halving.EACH, "halved": halving.EACH}
@@ -157,6 +161,7 @@ def main(argv=None):
     launcher, records = engine.find_launcher(), []
     for name in a.scene or (TUNED[:1] if a.few_steps else TUNED + HELD_OUT):
         case = cases.load([name], "quick")[0]
+        case.sized |= SIZES.get(name, {})
         case.scenes = {case.main_scene: case.scenes[case.main_scene]}
         records += records_of(case, launcher, a.few_steps)
     if a.few_steps:
