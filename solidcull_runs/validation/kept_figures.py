@@ -36,34 +36,29 @@ def figure_off(metric, verdict, unculled):
     figure = {"figure": metric["name"], "percent": percent(verdict.difference), "margins": round(verdict.in_margins, 2),
               "scatter": percent(max(values) - min(values)), "verdict": verdict.word}
     if verdict.pairs:
-        signed = [round(100 * x / abs(mean), 2) if mean else None for x in (verdict.low, verdict.high)]
-        figure |= {"pairs": verdict.pairs, "low": signed[0], "high": signed[1],
-                   "low_margins": round(verdict.low / verdict.margin, 2) if verdict.margin else None,
-                   "high_margins": round(verdict.high / verdict.margin, 2) if verdict.margin else None}
+        unit, scale = ("%", 100 / abs(mean)) if metric["relative"] and mean else (metric["unit"], 1)
+        low, high, by = (float(f"{scale * x:.3g}") for x in (verdict.low, verdict.high, verdict.difference))
+        reach = max(abs(verdict.low), abs(verdict.high)) / verdict.margin if verdict.margin else None
+        figure |= {"pairs": verdict.pairs, "unit": unit, "low": low, "high": high, "by": by, "reach": reach and round(reach, 2)}
     return figure
 
 
 def told(figure):
     """The verdict on a figure, in words. With pairs that were added until it was decided: within what the runs are equal, or by how
-    much they differ, in per cent of the unculled mean; in margins where that is nothing."""
+    much they differ; in per cent of the unculled mean, or in the figure's unit where its margin is."""
     if "pairs" not in figure:
         return figure["verdict"]
-    unit, low, high = ("margins", figure["low_margins"], figure["high_margins"]) if figure["percent"] is None else ("%", figure["low"], figure["high"])
-    if low is None:
-        return figure["verdict"]
     if figure["verdict"] == verdicts.SAME:
-        return f"equal within {max(abs(low), abs(high)):.2g} {unit}"
+        return f"equal within {max(abs(figure['low']), abs(figure['high'])):.2g} {figure['unit']}"
     if figure["verdict"] == verdicts.OTHER:
-        return f"differs by {figure['margins'] if figure['percent'] is None else figure['percent']:.2g} {unit}"
-    return f"not decided after {figure['pairs']} pairs: {low:+.2g} to {high:+.2g} {unit}"
+        return f"differs by {abs(figure['by']):.2g} {figure['unit']}"
+    return f"not decided after {figure['pairs']} pairs: {figure['low']:+.2g} to {figure['high']:+.2g} {figure['unit']}"
 
 
 def most_telling(record):
     """Of a record's figures that have its verdict, the one that is farthest off in margins, interval and all."""
-    def reach(figure):
-        bounds = [abs(figure[key]) for key in ("low_margins", "high_margins") if figure.get(key) is not None]
-        return max(bounds, default=figure["margins"])
-    return max((f for f in record["off"] if f["verdict"] == record["verdict"]), key=reach, default=record["off"][0])
+    alike = [f for f in record["off"] if f["verdict"] == record["verdict"]]
+    return max(alike, key=lambda f: f.get("reach") or f["margins"], default=record["off"][0])
 
 
 def records_of(result):

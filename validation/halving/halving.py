@@ -114,7 +114,7 @@ class Compared:
 
     @property
     def width(self):
-        """Of the interval, over the error; where that is smaller than what the runs can tell, over this."""
+        """Of the interval, over the error; where that is smaller than what the runs can tell, over this. Then the true ratio is larger."""
         return (self.told.high - self.told.low) / max(abs(self.error), self.known_to)
 
     def row(self):
@@ -122,7 +122,7 @@ class Compared:
             return f"{100 * value / abs(self.mean):{sign}.2g} %" if self.mean else f"{value:{sign}.2g}"
         told = self.told
         return [self.scene, self.metric, share(self.scatter), share(self.error, "+"), share(self.known_to), share(told.error, "+"),
-                f"{share(told.low, '+')} and {share(told.high, '+')}", "yes" if self.held else "**no**", f"{self.width:.1f}" + ("" if self.resolved else " (at most)")]
+                f"{share(told.low, '+')} and {share(told.high, '+')}", "yes" if self.held else "**no**", f"{self.width:.1f}" if self.resolved else f"({self.width:.1f})"]
 
 
 def compared(records, scenes):
@@ -141,11 +141,12 @@ def text_of(records):
     for title, scenes in (("Held out", HELD_OUT), ("Looked at while it was made", TUNED)):
         found = compared(records, scenes)
         if found:
-            held, narrow, _ = as_claimed(found)
-            resolved = [c for c in found if c.resolved]
+            resolved, rest = ([c for c in found if c.resolved == wanted] for wanted in (True, False))
+            held, narrow = (sum(c.held for c in found), sum(c.width <= WIDEST for c in rest))
             page.heading(2, title)
-            page.text(f"Of {len(found)} errors {held} are held. Of the {len(resolved)} that the runs can tell from none, {sum(c.held for c in resolved)} are. "
-                      f"{narrow} intervals are at most {WIDEST} times as wide as the error.")
+            page.text(f"Of {len(found)} errors {held} are held. Of the {len(resolved)} that the runs can tell from none, {sum(c.held for c in resolved)} are, and "
+                      f"{sum(c.width <= WIDEST for c in resolved)} intervals are at most {WIDEST} times as wide as the error. "
+                      f"Of the other {len(rest)} intervals, {narrow} are at most {WIDEST} times as wide as what the runs can tell.")
             page.table(HEAD, [c.row() for c in found])
     return page.markdown()
 
