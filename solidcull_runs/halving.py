@@ -159,7 +159,7 @@ def table(result):
         lines += ["", "runs of a kind are all alike: no granules were moved apart, or it made no difference; name a variable with --vary"]
     return "\n".join([*lines, "",
                       "difference   mean of the culled runs less mean of those with half the limits",
-                      f"scatter      standard deviation of single runs, whose limits are {min(VARIED):.2f} to {max(VARIED):.2f} times those meant",
+                      f"scatter      standard deviation of single runs, whose limits are {min(VARIED[:runs]):.2g} to {max(VARIED[:runs]):.2g} times those meant",
                       f"error        of the culled runs, told without one that is not: {MIDDLE:.2g} times the difference",
-                      f"between      in {100 * LEVEL:.0f} of 100 cases, if half the limits leave {min(HALVED):.0%} to {max(HALVED):.0%} of the error, or turn its sign, or let",
+                      f"between      in {100 * LEVEL:.0f} of 100 cases, if half the limits leave {100 * min(HALVED):.0f} to {100 * max(HALVED):.0f} % of the error, or turn its sign, or let",
                       "             it grow as much. An error that half the limits leave as it is they do not show"])

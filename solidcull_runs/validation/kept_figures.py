@@ -8,7 +8,7 @@ import statistics
 from pathlib import Path
 
 from ..errors import RunError
-from . import verdicts
+from . import sequential, verdicts
 from .points import LIVE, SLEEP
 
 
@@ -27,14 +27,16 @@ def text_of(records):
 
 
 def figure_off(metric, verdict, unculled):
-    """How far a figure is off by the line, and how far the unculled runs lie apart: in per cent of their mean, and in margins."""
+    """How far a figure is off by the line, and how far the first unculled runs lie apart: in per cent of their mean, and in margins.
+    As many of them as the first look has, for more would lie farther apart."""
     values = list(verdicts.values_of(unculled, metric["name"]).values())
+    first = values[:sequential.LOOKS[0]]
     mean = sum(values) / len(values)
 
     def percent(part):
         return round(100 * abs(part / mean), 2) if mean else None
     figure = {"figure": metric["name"], "percent": percent(verdict.difference), "margins": round(verdict.in_margins, 2),
-              "scatter": percent(max(values) - min(values)), "verdict": verdict.word}
+              "scatter": percent(max(first) - min(first)), "verdict": verdict.word}
     if verdict.pairs:
         unit, scale = ("%", 100 / abs(mean)) if metric["relative"] and mean else (metric["unit"], 1)
         low, high, by = (float(f"{scale * x:.3g}") for x in (verdict.low, verdict.high, verdict.difference))
