@@ -14,6 +14,7 @@ line and compared.
 | `measures` | what is measured of a run: heights of the bed, sums over all granules |
 | `twins` | runs of both kinds, one after the other or several at once, and their comparison |
 | `comparisons` | errors beside the noise floor, and the ledger |
+| `halving` | the error of culled runs, told from runs with half the limits |
 | `few_steps` | what can be checked of a run after a few steps |
 | `tables` | comparisons as text |
 | `plots` | curves of runs of both kinds |
@@ -34,6 +35,8 @@ The folder `validation` is what `validation/run.sh` is made of:
 | `validation.case_results` | what the runs of a case gave, as plain data |
 | `validation.fields` | coarse-grained fields of a bed, and their distance |
 | `validation.verdicts` | two one-sided tests on pairs of runs, and what they say of a case |
+| `validation.sequential` | how far a mean may lie from what pairs of runs show, where pairs are added |
+| `validation.deciding` | which pairs of runs a case still lacks for its verdicts |
 | `validation.slices` | a picture of what moves, in a slice of the bed |
 | `validation.report_plots` | plots of the report |
 | `validation.pages` | text, tables and pictures as Markdown and HTML |

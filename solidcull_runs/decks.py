@@ -11,7 +11,7 @@ SEEDS = (15485863, 15485867, 32452843, 32452867, 49979687, 49979693, 67867967, 6
 ENDS_BEFORE = "twin: compared up to line "
 SETTING_UP = {"fix", "fix_modify", "compute", "compute_modify", "thermo", "thermo_style", "thermo_modify", "dump", "dump_modify", "region",
               "variable", "timestep", "neighbor", "neigh_modify", "restart"}  # commands that ask for no granule
-CULL_LINE = re.compile(r"^(fix\s+\S+\s+\S+\s+solid/cull.*)$", re.M)
+CULL_LINE = re.compile(r"^([ \t]*fix[ \t]+\S+[ \t]+\S+[ \t]+solid/cull(?=\s|$)[^#\n]*?)([ \t]*#.*)?$", re.M)  # and its comment
 
 
 def read_deck(path):
@@ -43,7 +43,7 @@ def without_comments(lines):
 
 def with_keywords(text, keywords):
     """A deck whose solid/cull line has more keywords."""
-    made, lines = CULL_LINE.subn(lambda line: f"{line[1]} {keywords}", text)
+    made, lines = CULL_LINE.subn(lambda line: f"{line[1]} {keywords}{line[2] or ''}", text)
     if lines != 1:
         raise RunError(f"a deck with {lines} solid/cull lines cannot be given the keywords: {keywords}")
     return made

@@ -1,4 +1,4 @@
-"""Curves of unculled and culled runs."""
+"""Curves of unculled and culled runs, or of culled ones and those with half the limits."""
 import matplotlib
 
 matplotlib.use("Agg")
@@ -7,14 +7,14 @@ import matplotlib.pyplot as plt  # noqa: E402
 # the paper's colours, by the value of the point array `state`
 STATES = {0: ("exterior", (0.85, 0.73, 0.55)), 1: ("interface", (0.25, 0.45, 0.80)), 2: ("interior", (0.33, 0.62, 0.33)),
           3: ("waking", (0.95, 0.55, 0.10))}
-STYLES = (("unculled", "0.75", 4), ("culled", "tab:blue", 1.3))  # kind, colour, width of the line
+STYLES = (("unculled", "0.75", 4), ("halved", "0.75", 4), ("culled", "tab:blue", 1.3))  # kind, colour, width of the line
 
 
 def of_both(runs):
     """Kind's label (for its first run alone), style of the line and run, for each run."""
     for kind, colour, width in STYLES:
-        n = len(runs[kind])
-        for k, run in enumerate(runs[kind]):
+        n = len(runs.get(kind, ()))
+        for k, run in enumerate(runs.get(kind, ())):
             yield {"label": f"{kind}, {n} run{'s' if n > 1 else ''}" if k == 0 else None, "color": colour, "lw": width}, run
 
 

@@ -273,6 +273,19 @@ class Validation(Scripts):
                     self.assertGreater(min(without["user"], with_it["user"], result["user"]), 0)
                     self.assertGreaterEqual(with_it["culled"], with_it["restored"])
 
+    def test_halving(self):
+        """Its kinds of runs in one scene: each goes to its end, with its limits."""
+        runs = ROOT / "validation" / "halving" / "out" / "few" / "slow_impact" / "runs"
+        shutil.rmtree(runs, ignore_errors=True)
+        self.run_script(ROOT / "validation" / "halving" / "halving.py")
+        keywords = {}
+        for deck in runs.glob("*.in"):
+            line, = (line for line in deck.read_text().splitlines() if "solid/cull" in line)
+            keywords[deck.stem.rpartition("-m-")[2]] = line
+            self.assertIn("twin: end of the deck\n", deck.with_suffix(".log").read_text())
+        self.assertEqual(keywords, {"unculled-1": "# fix cull all solid/cull", "varied-1": "fix cull all solid/cull tolerance 3 0 speed 0.01",
+                                    "halved-1": "fix cull all solid/cull tolerance 1.5 0 speed 0.005"})
+
     def test_chain(self):
         few = ROOT / "validation" / "chain" / "out" / "few"
         (few / "chain.json").unlink(missing_ok=True)

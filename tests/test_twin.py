@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path[:0] = [str(ROOT), str(ROOT / "validation")]
 import twin  # noqa: E402
-from solidcull_runs import beds, comparisons, cutaways, decks, dumps, engine, errors, few_steps, logs, measures, meshes, plots, shifts, tables, twins  # noqa: E402
+from solidcull_runs import beds, comparisons, cutaways, decks, dumps, engine, errors, few_steps, halving, logs, measures, meshes, plots, shifts, tables, twins  # noqa: E402
 
 DECK = """\
 variable dx index 0
@@ -92,8 +92,10 @@ if "forever" in deck:
     time.sleep(600)
 culled = re.search(r"(?m)^fix cull", deck) is not None
 shift = 0.01 * ("set group all x" in deck)
+speed = re.search(r"(?m)^fix cull.* speed (\\S+)", deck)
+of_limits = float(speed[1]) / 0.01 if speed else 1
 print("twin: counted from here\\n    Step    depth")
-print(f"  0  0.5\\n  10  {1 + shift + 0.001 * culled}")
+print(f"  0  0.5\\n  10  {1 + shift + 0.001 * culled * of_limits}")
 print(f"Loop time of {4 if culled else 10} on 1 procs\\ntwin: end of the deck")
 if culled:
     file = re.search(r'ave/time.* file "(.*)"', deck)[1]
@@ -313,6 +315,54 @@ class Figures(unittest.TestCase):
         self.assertEqual(comparisons.apart([0, 1, 5], [2], lambda a, b: abs(a - b)), ((2 + 1 + 3) / 3, 5))
 
 
+class Halving(unittest.TestCase):
+    """Half the limits: what is halved, and what that says of the error."""
+
+    def test_what_is_halved(self):
+        for line, made in (("fix c all solid/cull", "tolerance 1.5 0 speed 0.005"),
+                           ("  fix c all solid/cull speed 0.5 tolerance 1 0.3 # speed 7", "tolerance 0.5 0.15 speed 0.25"),
+                           ("fix c all solid/cull tolerance 1 0 speed 1 tolerance 3e1 0", "tolerance 15 0 speed 0.5"),
+                           ("fix c all solid/cull tolerance ${a} $r speed $(2*v_s)", "tolerance $(0.5*(v_a)) $(0.5*(v_r)) speed $(0.5*((2*v_s)))")):
+            self.assertEqual(halving.keywords(["run 0", line], 0.5), made, line)
+
+    def test_defaults_are_those_of_the_fix(self):
+        page = (ROOT / "fix_solid_cull" / "fix_solid_cull.md").read_text().partition("\n## Default\n")[2]
+        for name, values in halving.DEFAULTS.items():
+            self.assertIn(f" {name} {' '.join(values)} ", page)
+
+    def test_keywords_stand_before_a_comment(self):
+        self.assertEqual(decks.with_keywords("run 0\n  fix c all solid/cull every 3  # why\n", "speed 1"), "run 0\n  fix c all solid/cull every 3 speed 1  # why\n")
+        self.assertEqual(decks.with_keywords("# fix a all solid/cull\nfix c all solid/cull\n", "speed 1"), "# fix a all solid/cull\nfix c all solid/cull speed 1\n")
+
+    def test_without_scatter(self):
+        told = halving.extrapolate([2.0, 2.0], [1.0, 1.0])
+        self.assertTrue(told.low < 0 < told.error < told.high, told)
+        # 5 of 100 lie beyond either bound: a fifth of the errors that grow, a tenth of those that shrink
+        self.assertAlmostEqual(told.low, 1 / (1 - 2**0.38), delta=0.05)
+        self.assertAlmostEqual(told.high, 1 / (1 - 2**-0.24), delta=0.05)
+        other = halving.extrapolate([1.0, 1.0], [2.0, 2.0])
+        for one, two in ((other.low, -told.high), (other.high, -told.low), (other.error, -told.error)):
+            self.assertAlmostEqual(one, two, 12)
+
+    def held(self, runs, alike, least, most):
+        """How many of 200 errors of `least` to `most` scatters are held, where half the limits do what they are taken to do."""
+        random, held = np.random.default_rng(7), []
+        for _ in range(200):
+            error, p, start = random.uniform(least, most), random.uniform(*halving.EXPONENTS), 5 * random.standard_normal(runs) * alike
+            left = error * random.choice([2**-p, 2**-p, -2**-p, 2**p])
+            whole, halved = (list(e + start + random.standard_normal(runs)) for e in (error, left))
+            told = halving.extrapolate(whole, halved, alike)
+            held.append(told.low <= error <= told.high)
+        return np.mean(held)
+
+    def test_the_interval_holds_what_it_says(self):
+        """90 of 100 of errors that stand out of the scatter, and no fewer of those that do not; whatever the number of runs."""
+        for runs, alike in ((2, False), (4, False), (5, True)):
+            with self.subTest(runs=runs):
+                self.assertAlmostEqual(self.held(runs, alike, 50, 200), halving.LEVEL, delta=0.07)  # 3.3 standard deviations of 200 trials
+                self.assertGreater(self.held(runs, alike, 0, 3), halving.LEVEL)
+
+
 class Command(Folder):
     def setUp(self):
         super().setUp()
@@ -341,6 +391,35 @@ class Command(Folder):
         for file in ("twin.json", "twin.png", "culled-1.in", "unculled-3.log"):
             self.assertTrue((self.folder / "in.deck.twin" / file).exists(), file)
 
+    def test_half_the_limits(self):
+        status, out, _ = self.run_twin(self.DECK, "--metrics", "v_depth", "--halve", "--plot")
+        self.assertEqual(status, 0, out)
+        result = json.loads((self.folder / "in.deck.twin" / "twin.json").read_text())
+        m = result["metrics"]["v_depth"]
+        self.assertEqual(result["keywords"], "tolerance 1.5 0 speed 0.005")
+        for kind, share in halving.KINDS.items():
+            for k, value in enumerate(m[kind]):
+                self.assertAlmostEqual(value, 1 + 0.01 * (k > 0) + 0.001 * share * halving.VARIED[k], 7)
+        self.assertAlmostEqual(m["difference"], 0.0005 * np.mean(halving.VARIED[:4]), 7)
+        self.assertAlmostEqual(m["error"], halving.MIDDLE * m["difference"], 12)
+        self.assertTrue(m["low"] < 0 < m["error"] < m["high"], m)
+        self.assertRegex(out, r"v_depth +1\.00853 +1\.00802 +\+0\.05 % +0\.50 % +\+0\.06 % ")
+        self.assertIn("lost 0, ids missing 0", out)
+        for file in ("twin.png", "culled-4.log", "halved-4.in"):
+            self.assertTrue((self.folder / "in.deck.twin" / file).exists(), file)
+        self.assertFalse((self.folder / "in.deck.twin" / "unculled-1.in").exists())
+        self.assertIn("fix cull all solid/cull tolerance 1.5 0 speed 0.005\n", (self.folder / "in.deck.twin" / "halved-1.in").read_text())
+
+    def test_half_the_limits_of_runs_that_are_all_alike(self):
+        _, out, _ = self.run_twin('print "${dx}"\n' + self.DECK.replace("step v_depth", "step v_other v_depth"), "--metrics", "v_depth", "--halve", "--vary", "dx=0,1,2,3")
+        self.assertNotIn("all alike", out, "their limits differ")
+
+    def test_what_does_not_go_with_half_the_limits(self):
+        for words in (("--unculled", "2"), ("--margin", "0.1"), ("--culled", "1")):
+            with self.subTest(words), self.assertRaises(SystemExit), contextlib.redirect_stderr(io.StringIO()) as said:
+                twin.main(["deck", "--halve", *words])
+            self.assertRegex(said.getvalue(), "leave --unculled and --margin out|--culled 2 to 10")
+
     def test_a_lost_granule_is_no_success(self):
         status, out, _ = self.run_twin(self.DECK + "# lossy\n", "--metrics", "v_depth")
         self.assertEqual(status, 1)
@@ -355,6 +434,10 @@ class Command(Folder):
                 (self.DECK, ("--metrics", "v_depth:median"), "`median` is not one of end, max, min, mean"),
                 (self.DECK, ("--launcher", "/nowhere/liggghts-solidcull"), "no launcher at /nowhere/liggghts-solidcull"),
                 (self.DECK, ("--vary", "dx=0,1"), "--vary dx has 2 values for 3 runs"),
+                (self.DECK, ("--halve", "--vary", "dx=0,1"), "--vary dx has 2 values for 4 runs"),
+                (self.DECK, ("--halve", "--metrics", "c_nope"), "c_nope is not among the thermo columns"),
+                (self.DECK.replace("cull\n", "cull speed fast\n", 1), ("--halve",), "`fast` is no number, so it cannot be halved: fix cull all solid/cull speed fast"),
+                (self.DECK.replace("cull\n", "cull tolerance 1\n", 1), ("--halve",), "`tolerance` lacks a number: fix cull all solid/cull tolerance 1"),
                 (self.DECK, ("--vary", "dx=0,1,2"), "--vary dx: the deck does not use it")):
             status, out, err = self.run_twin(deck, *options)
             self.assertEqual((status, out), (2, ""), text)
@@ -446,6 +529,28 @@ class RealDecks(Folder):
         deck = self.write("in.deck", f"{head}{LINE}variable h equal bound(all,zmax)\nprint \"${{h}}\"\nunfix grav\nfix grav all gravity 9.81 vector 1 0 -1\nrun 1000\n")
         result, _ = twins.compare(deck, ["ke"], out=self.folder / "out", culled=2)
         self.assertEqual((result["ledger"]["granules"], result["ledger"]["lost"], result["no_scatter"]), (60, 0, False))
+
+
+    def test_half_the_limits(self):
+        """A bed at rest that is tilted: what it does is told from culled runs alone, and the run without the line bears it out."""
+        pack = f"fix ins all insert/pack seed 86028157 distributiontemplate pdd insert_every once {PLACE} particles_in_region 120\n"
+        engine.run_liggghts(self.write("fill.in", f"{HEAD}{pack}run 12000\nunfix ins\nwrite_restart bed.restart\n"), self.folder, self.folder / "fill.log")
+        head = HEAD.replace("create_box 1 reg", "read_restart bed.restart")
+        tilted = "unfix grav\nfix grav all gravity 9.81 vector 0.5 0 -1\n"
+        columns = "compute mid all reduce ave x\ncompute top all reduce max z\nthermo_style custom step ke c_mid c_top\n"
+        deck = self.write("in.deck", f"{head}fix cull all solid/cull every 10\nrun 200\n{tilted}{columns}run 4000\nunfix cull\nthermo_style custom step c_mid c_top\nrun 0\n")
+        metrics = ["c_mid", "c_top"]
+        told, runs = halving.compare(deck, metrics, out=self.folder / "out")
+        self.assertEqual((told["keywords"], told["ledger"]["lost"], told["ledger"]["ids_missing"], told["no_scatter"]), ("tolerance 1.5 0 speed 0.005", 0, 0, False))
+        self.assertEqual([run.name for run in runs["halved"]], [f"halved-{k}" for k in (1, 2, 3, 4)])
+        self.assertGreater(told["halved"]["exterior"], told["culled"]["exterior"], "half the limits leave more awake")
+        truth, _ = twins.compare(deck, metrics, out=self.folder / "out")
+        for name in metrics:
+            t, m = truth["metrics"][name], told["metrics"][name]
+            self.assertEqual(t["culled"], m["culled"][:1], "the same run")
+            error = np.mean(m["culled"]) - t["mean"]
+            self.assertTrue(m["low"] < error < m["high"], f"{name}: {m['low']} to {m['high']}, and it is {error}")
+        self.assertIn("c_top", halving.table(told))
 
 
 class Pictures(Folder):
@@ -635,7 +740,7 @@ class Drivers(unittest.TestCase):
     DRIVERS = ("examples/impact/example.py", "examples/drum/example.py", "examples/falling_mass/example.py", "examples/plate_discharge/example.py",
                "validation/motion/motion.py", "validation/scale/scale.py", "validation/scale/choices.py", "validation/scale/weight.py", "validation/scale/tools.py",
                "validation/activity/activity.py", "validation/stress/stress.py", "validation/no_harm/no_harm.py",
-               "validation/chain/chain.py", "validation/ladder/ladder.py")
+               "validation/chain/chain.py", "validation/ladder/ladder.py", "validation/halving/halving.py")
 
     def test_no_launcher(self):
         for driver in self.DRIVERS:

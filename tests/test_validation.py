@@ -4,6 +4,7 @@ data/validation_result.json is the result of `validation/run.sh --quick slow_imp
 """
 import collections
 import contextlib
+import importlib.util
 import json
 import math
 import os
@@ -19,12 +20,14 @@ import unittest
 from pathlib import Path
 
 import numpy as np
+from scipy import stats
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT))
 from solidcull_runs import logs  # noqa: E402
-from solidcull_runs.validation import case_results, case_runs, cases, command, fields, first_page, kept_figures, pages, points, report, short_cases, verdicts  # noqa: E402
+from solidcull_runs.validation import (case_results, case_runs, cases, command, deciding, fields, first_page, kept_figures, pages, points,  # noqa: E402
+                                       report, sequential, short_cases, verdicts)
 from solidcull_runs.errors import RunError  # noqa: E402
 
 STORED = ROOT / "tests" / "data" / "validation_result.json"
@@ -215,6 +218,172 @@ class Statistics(unittest.TestCase):
         self.assertAlmostEqual(verdicts.order(tolerances, [0.1, 0.1, 1, 3], 0.2), 1, 12)
 
 
+class Sequential(unittest.TestCase):
+    """Pairs that are added until a metric is decided. The margin is 1."""
+
+    RUNS = 4000
+    PAIRS = sequential.LOOKS[-1]
+
+    def pairs(self, data):
+        """Differences of pairs, of mean 0 and standard deviation 1."""
+        random = np.random.default_rng(11)
+        size = (self.RUNS, self.PAIRS)
+        return {"normal": lambda: random.standard_normal(size),
+                "of runs as skewed as an exponential": lambda: (random.exponential(1, size) - random.exponential(1, size)) / math.sqrt(2),
+                "of runs as skewed as a lognormal": lambda: (random.lognormal(0, 1, size) - random.lognormal(0, 1, size)) / math.sqrt(2 * (math.e - 1) * math.e),
+                "skewed": lambda: (random.gamma(4, 1, size) - 4) / 2,
+                "skewed the other way": lambda: (4 - random.gamma(4, 1, size)) / 2,
+                "as skewed as an exponential": lambda: random.exponential(1, size) - 1}[data]()
+
+    def words(self, differences, quantile=sequential.quantile):
+        """Shares of SAME and OTHER, and the mean number of pairs, of many cases at once: as verdicts.in_looks() judges each."""
+        looks = np.array(sequential.LOOKS)
+        mean = differences.cumsum(1)[:, looks - 1] / looks
+        square = (differences**2).cumsum(1)[:, looks - 1] / looks
+        half = np.array([quantile(n) for n in sequential.LOOKS]) * np.sqrt(np.maximum(square - mean**2, 0) / (looks - 1))
+        same, other = (np.abs(mean) + half < 1), (np.abs(mean) - half > 1)
+        ended = same | other
+        at = np.where(ended.any(1), ended.argmax(1), len(looks) - 1)
+        each = np.arange(len(at))
+        return same[each, at].mean(), other[each, at].mean(), looks[at].mean()
+
+    def test_many_at_once_are_judged_as_one(self):
+        differences = 0.4 + 0.8 * self.pairs("skewed")[:150]
+        words = [verdicts.in_looks(dict.fromkeys(range(30), 0.0), dict(enumerate(d)), lambda mean: 1.0) for d in differences]
+        same, other, pairs = self.words(differences)
+        self.assertAlmostEqual(statistics.fmean(v.word == verdicts.SAME for v in words), same, 12)
+        self.assertAlmostEqual(statistics.fmean(v.word == verdicts.OTHER for v in words), other, 12)
+        self.assertAlmostEqual(statistics.fmean(v.pairs for v in words), pairs, 12)
+        self.assertEqual({v.word for v in words}, {verdicts.SAME, verdicts.OPEN})
+
+    def test_at_the_margins_edge_neither_word_is_said_by_chance(self):
+        """A difference of just the margin is neither smaller nor larger."""
+        for data in ("normal", "of runs as skewed as an exponential", "of runs as skewed as a lognormal", "skewed", "skewed the other way"):
+            for scatter in (0.1, 0.5, 1, 3):
+                same, other, _ = self.words(1 + scatter * self.pairs(data))
+                with self.subTest(data=data, scatter=scatter):
+                    self.assertLessEqual(same, verdicts.LEVEL)
+                    self.assertLessEqual(other, verdicts.LEVEL)
+
+    def test_where_it_ends(self):
+        """Differences of pairs as skewed as an exponential are more than it can bear; such as of no metric so far."""
+        same, _, _ = self.words(1 + 0.5 * self.pairs("as skewed as an exponential"))
+        self.assertTrue(verdicts.LEVEL < same < 2 * verdicts.LEVEL, same)
+
+    def test_one_look_after_the_other_without_this_errs_more(self):
+        def of_one_look(n):
+            return float(stats.t.isf(verdicts.LEVEL, n - 1))
+        self.assertGreater(self.words(1 + 0.5 * self.pairs("normal"), of_one_look)[0], 2 * verdicts.LEVEL)
+
+    def test_the_intervals_of_all_looks_together(self):
+        """They miss the mean, on one side, as often as is spent: of normal data, but for what Student's t adds."""
+        looks = np.array(sequential.LOOKS)
+        differences = self.pairs("normal")
+        mean, square = (x.cumsum(1)[:, looks - 1] / looks for x in (differences, differences**2))
+        half = np.array([sequential.quantile(n) for n in sequential.LOOKS]) * np.sqrt((square - mean**2) / (looks - 1))
+        missed = (mean - half > 0).any(1).mean()
+        self.assertAlmostEqual(missed, sequential.SPENT, delta=0.006)  # 3.4 standard deviations of 4,000 trials
+        self.assertEqual(sorted(sequential.levels()), list(sequential.levels()))
+        self.assertEqual([sequential.next_look(n) for n in (0, 4, 5, 6, 29, 30, 31)], [5, 5, 8, 8, 30, None, None])
+
+    def test_how_many_pairs_it_takes(self):
+        for difference, scatter, most, decided in ((0, 0.05, 5.1, 1), (0, 0.2, 7.6, 1), (0, 0.5, 11.5, 1), (0, 1, 20, 0.98), (0.5, 0.5, 16.5, 0.99), (2, 0.5, 11.5, 1), (3, 1, 11.5, 1)):
+            same, other, pairs = self.words(difference + scatter * self.pairs("normal"))
+            with self.subTest(difference=difference, scatter=scatter):
+                self.assertLess(pairs, most)
+                self.assertGreaterEqual(same + other, decided)
+
+    def test_a_verdict_stays_that_of_the_look_that_decided(self):
+        unculled = dict.fromkeys(range(30), 100.0)
+        culled = {k: 100.01 + 0.001 * (k % 2) if k < 5 else 150.0 for k in range(30)}
+        v = verdicts.in_looks(unculled, culled, lambda mean: 0.02 * mean)
+        self.assertEqual((v.word, v.pairs, v.margin), (verdicts.SAME, 5, 2.0))
+        v = verdicts.in_looks(unculled, {k: culled[k] for k in range(4)}, lambda mean: 2.0)
+        self.assertEqual((v.word, v.pairs), (verdicts.OPEN, 4))
+        missing = {k: x for k, x in culled.items() if k != 1}
+        self.assertEqual(verdicts.in_looks(unculled, {k: missing[k] for k in sorted(missing)[:4]}, lambda mean: 2.0).pairs, 4, "a run that failed")
+        self.assertRaises(ValueError, verdicts.in_looks, {0: 1.0, 1: 2.0}, {1: 1.0}, abs)
+
+
+class Halving(unittest.TestCase):
+    """What is kept of validation/halving: the page is made of the values, and as it claims."""
+
+    @classmethod
+    def setUpClass(cls):
+        spec = importlib.util.spec_from_file_location("validation_halving", ROOT / "validation" / "halving" / "halving.py")
+        cls.script = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(cls.script)
+        cls.folder = ROOT / "validation" / "halving"
+        cls.records = json.loads((cls.folder / "results.json").read_text())
+
+    def test_the_page_is_made_of_the_values(self):
+        text = (self.folder / "RESULTS.md").read_text()
+        self.assertEqual(pages.between_marks(self.folder / "RESULTS.md", self.script.BEGIN, self.script.text_of(self.records)), text)
+
+    def test_true_errors_are_held(self):
+        """In at least four scenes that it was not made for."""
+        found = self.script.compared(self.records, self.script.HELD_OUT)
+        self.assertGreaterEqual(len({c.scene for c in found}), 4)
+        self.assertGreaterEqual(len(found), 12)
+        held, _, _ = self.script.as_claimed(found)
+        self.assertGreaterEqual(held, self.script.LEAST_HELD * len(found))
+        self.assertLess(statistics.median(c.width for c in found), self.script.WIDEST)
+
+    def test_an_error_that_half_the_limits_leave_is_not_held(self):
+        """The comparison can fail."""
+        record = {"scene": "impact", "metric": "m", "unculled": [0.0, 0.1, -0.1], "varied": [9.0, 9.1, 8.9], "halved": [9.0, 9.1, 8.9]}
+        c = self.script.Compared(record)
+        self.assertFalse(c.held)
+        self.assertEqual(self.script.as_claimed([c] * 4), (0, 4, False))
+        wide = self.script.Compared({**record, "varied": [1.0, 1.1, 0.9], "halved": [-9.0, -9.1, -8.9]})
+        self.assertTrue(wide.held and wide.width > self.script.WIDEST)
+        self.assertFalse(self.script.as_claimed([wide])[2])
+
+
+class Deciding(unittest.TestCase):
+    """Which runs a case still lacks."""
+
+    DEFAULTS = {p.family: p for p in points.points() if p.default}
+
+    def further(self, values, failed=()):
+        """`values`: by family, of the one metric in each run."""
+        Job = collections.namedtuple("Job", "scene point k")
+        done = {Job("a", self.DEFAULTS[family], k): "killed" if (family, k) in failed else types.SimpleNamespace(metrics={"depth": x})
+                for family, of_family in values.items() for k, x in enumerate(of_family)}
+        case = types.SimpleNamespace(scenes={"a": {}}, metrics=[cases.Metric("depth", "m", 0.02, True, "")])
+        return {scene: [(p.family, k) for p, k in wanted] for scene, wanted in deciding.further(case, done).items()}
+
+    def test_pairs_are_added_where_one_is_not_decided(self):
+        near, far = [1.0, 1.0001, 0.9999, 1.0, 1.0001], [1.0, 1.03, 0.96, 1.04, 1.01]
+        self.assertEqual(self.further({"unculled": near, "sleep": near, "live": near}), {})
+        self.assertEqual(self.further({"unculled": near, "sleep": near, "live": far}),
+                         {"a": [(family, k) for k in (5, 6, 7) for family in ("unculled", "live")]})
+        self.assertEqual(self.further({"unculled": near, "sleep": far, "live": far})["a"],
+                         [(family, k) for k in (5, 6, 7) for family in ("unculled", "sleep", "live")])
+
+    def test_up_to_the_first_look_where_there_are_fewer(self):
+        self.assertEqual(self.further({"unculled": [1.0, 1.0, 1.0], "sleep": [1.0, 1.0, 1.0]})["a"], [(family, k) for k in (3, 4) for family in ("unculled", "sleep")])
+
+    def test_thirty_at_most(self):
+        far = [1.0, 1.05] * 15
+        self.assertEqual(self.further({"unculled": far, "sleep": far[::-1]}), {})
+
+    def test_what_was_not_run_is_not_asked_for(self):
+        self.assertEqual(self.further({"unculled": [1.0] * 5}), {})
+
+    def test_runs_that_failed_are_not_made_again(self):
+        far = [1.0, 1.03, 0.96, 1.04, 1.01]
+        self.assertEqual(self.further({"unculled": [1.0] * 5, "sleep": far}, {("sleep", 4)})["a"], [(family, k) for k in (5, 6, 7) for family in ("unculled", "sleep")])
+
+    def test_thirty_starts(self):
+        self.assertEqual(len(set(case_runs.ASIDE)), sequential.LOOKS[-1])
+        self.assertLess(max(map(abs, case_runs.ASIDE)), 1.6e-4)
+
+    def test_it_is_a_part_of_full(self):
+        for words, decide in (([], False), (["--full"], True), (["--decide"], True), (["--full", "--no-decide"], False)):
+            self.assertEqual(command.options(words).decide, decide, words)
+
+
 class Fields(unittest.TestCase):
     def bed(self, shift=0.0, n=400):
         rng = np.random.default_rng(3)
@@ -354,6 +523,34 @@ class Publish(Folder):
         self.assertEqual(depth, {"figure": "depth", "percent": round(100 * abs(judged.verdicts["depth"].difference) / mean, 2),
                                  "margins": round(judged.verdicts["depth"].in_margins, 2),
                                  "scatter": round(100 * (max(depths) - min(depths)) / mean, 2), "verdict": judged.verdicts["depth"].word})
+
+    def test_what_was_decided_is_told_in_per_cent(self):
+        """Within what the runs are equal, or by how much they differ; and a reader is told where thirty pairs do not tell."""
+        result = {**case_results.read_result(STORED), "decided": True}
+        scene = verdicts.main_scene(result)
+        names = [m["name"] for m in result["metrics"]]
+        by_metric = dict(zip(names, ((100, 0.1, 100.4), (100, 0.1, 130), (100, 40, 100), (100, 0.1, 100), (100, 0.1, 100))))
+        for point, shift in (("unculled", False), ("sleep 3 0", True), ("live 3 0", False)):
+            scene["points"][point]["runs"] = [{**scene["points"][point]["runs"][0], "k": k, "values": {
+                name: (culled if shift else mean) + scatter * (-1)**k * shift for name, (mean, scatter, culled) in by_metric.items()}} for k in range(30)]
+        record = kept_figures.records_of(result)[0]
+        told = {f["figure"]: kept_figures.told(f) for f in record["off"]}
+        self.assertEqual({f["figure"]: f["pairs"] for f in record["off"]}, dict(zip(names, (5, 5, 30, 5, 5))))
+        self.assertRegex(told[names[0]], r"^equal within 1\.\d+ %$")
+        self.assertEqual(told[names[1]], "differs by 30 %")
+        self.assertRegex(told[names[2]], r"^not decided after 30 pairs: -\d+ to \+\d+ %$")
+        self.assertEqual(record["verdict"], verdicts.OTHER)
+        self.assertEqual(report.overview_row([record], "A")[-1], f"differs by 30 % ({names[1]}); 30 pairs")
+        report.write([result], self.folder / "report")
+        text = (self.folder / "report" / "README.md").read_text()
+        for part in (told[names[0]], told[names[1]], told[names[2]], "until each metric was decided, 30 at most"):
+            self.assertIn(part, text)
+        in_metres = kept_figures.figure_off({**result["metrics"][0], "relative": False}, verdicts.judge(result)["sleep 3 0"].verdicts[names[0]],
+                                            verdicts.unculled_of(scene))
+        self.assertRegex(kept_figures.told(in_metres), r"^equal within 1(\.\d+)? m$")
+        record["case"] = "fed_heap"
+        row = first_page.case_row([record], "fed_heap", "heap")
+        self.assertRegex(row[4], rf"^\*\*{names[1]} differs by 30 %; {names[2]} -\d+ to \+\d+ %\*\*$")
 
     def test_what_is_outside_in_another_scene_is_told(self):
         """In the first page's table, among what is outside in per cent, and in README.md's row."""

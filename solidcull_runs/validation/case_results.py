@@ -13,6 +13,7 @@ from .points import ALSO, BY_HAND, PAPER, UNCULLED
 
 MOVED = 1e-2  # mean diameters between two snapshots: what moves
 DRAWN = 120  # values kept of a curve
+FIELDS_OF = 5  # runs of each point
 WANTED = {"case", "title", "claim", "reference", "size", "metrics", "scenes", "failed", "bound", "fields", "laws", "lost", "lost_refilled"}
 
 
@@ -50,11 +51,12 @@ def run_data(job, run):
     return data
 
 
-def result_of(case, done):
-    """What the runs of a case gave. `done`: as from run_all(), of this case's jobs."""
+def result_of(case, done, decided=False):
+    """What the runs of a case gave. `done`: as from run_all(), of this case's jobs. `decided`: pairs were added until each metric was,
+    or there were as many as there may be."""
     result = {"case": case.name, "title": case.title, "claim": case.claim, "reference": case.reference, "size": case.size,
               "metrics": [{"name": m.name, "unit": m.unit, "margin": m.margin, "relative": m.relative, "why": m.why} for m in case.metrics],
-              "scenes": {}, "failed": [], "bound": None, "fields": {}, "laws": [], "lost": 0, "lost_refilled": 0}
+              "scenes": {}, "failed": [], "bound": None, "fields": {}, "laws": [], "lost": 0, "lost_refilled": 0, "decided": decided}
     for scene in case.scenes:
         of_scene = {}
         for job, run in done.items():
@@ -77,7 +79,7 @@ def result_of(case, done):
     main = {job: run for job, run in done.items() if job.scene == case.main_scene and not isinstance(run, str)}
     finals = {}
     for job, run in main.items():
-        if run.final is not None:
+        if run.final is not None and job.k < FIELDS_OF:
             finals.setdefault(job.point, []).append(run.final)
     unculled = next((p for p in finals if p.family == UNCULLED), None)
     if unculled:

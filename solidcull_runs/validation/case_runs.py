@@ -13,7 +13,7 @@ from ..twins import KeptJob
 from .cases import short_hash
 from .points import BY_HAND, PAPER, UNCULLED, points, runs_of
 
-ASIDE = [k * 1e-5 for k in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5)]  # m: the place of a tool, ball or wall in each run
+ASIDE = [k * 1e-5 for k in (0, *(side * n for n in range(1, 16) for side in (1, -1)))][:30]  # m: the place of a tool, ball or wall in each run
 FRAMES = 200                                                    # steps between two snapshots, if the case says nothing
 STRESS = [f"c_twin_stress[{k}]" for k in range(1, 7)]
 COLUMNS = ["id", "mass", "radius", "x", "y", "z", "vx", "vy", "vz", *STRESS]
@@ -70,6 +70,10 @@ class Course:
     def __init__(self, jobs, at_once, say):
         self.left, self.at_once, self.say, self.all = list(jobs), at_once, say, len(jobs)
         self.spent = {}  # by scene: seconds, and the parts of an unculled run that took them
+
+    def add(self, jobs):
+        self.left += jobs
+        self.all += len(jobs)
 
     def skip(self, job):
         """It was made before."""
@@ -133,26 +137,36 @@ def make_beds(cases, out, at_once, say):
     return files
 
 
-def jobs_of(case, out, beds, launcher, fix, also=(), ranks=1):
-    """All runs of a case, unculled and culled ones in turns. `also`: see points(). On more ranks than one, those at the defaults."""
-    jobs = []
-    for scene in case.scenes:
+class Maker:
+    """Makes the jobs of a case."""
+
+    def __init__(self, case, out, beds, launcher, fix, ranks=1):
+        self.case, self.out, self.beds, self.launcher, self.fix, self.ranks = case, out, beds, launcher, fix, ranks
+
+    def jobs(self, scene, wanted):
+        """Of a scene. `wanted`: (point, number of the run), in their order."""
+        case, bed = self.case, self.beds[self.case.name, scene]
         v = case.variables(scene)
-        bed = beds[case.name, scene]
-        given = {**v, **files_of(case, scene, out), **({"restart": bed} if bed else {})}
+        given = {**v, **files_of(case, scene, self.out), **({"restart": bed} if bed else {})}
         texts = [f.read_text() for f in sorted({*case.folder.glob("*.in"), *(case.folder.parent.parent / "shared").glob("*.in")} - {case.deck})]
         texts.append(bed.with_suffix(".recipe").read_text() if bed else "")
+        made = []
+        for p, k in wanted:
+            frames = v.get("frames", FRAMES) if k == 0 and p.default and scene == case.main_scene else 0
+            made_with = "\n".join([*texts, self.fix if p.family not in (UNCULLED, BY_HAND) else ""])
+            made.append(CaseJob(case, scene, p, k, self.out / case.name / "runs", {**given, case.need("aside"): ASIDE[k]}, frames, self.launcher,
+                                made_with, self.ranks))
+        return made
+
+
+def jobs_of(case, out, beds, launcher, fix, also=(), ranks=1):
+    """All runs of a case, unculled and culled ones in turns. `also`: see points(). On more ranks than one, those at the defaults."""
+    jobs, maker = [], Maker(case, out, beds, launcher, fix, ranks)
+    for scene in case.scenes:
         main = scene == case.main_scene
         left_out = {family for family, there in ((BY_HAND, case.get("by_hand")), (PAPER, case.get("paper", True))) if not there}
         wanted = [p for p in points(also) if (p.everywhere or main) and p.family not in left_out and (ranks == 1 or p.everywhere)]
-        for k in range(max(runs_of(p, main) for p in wanted)):
-            for p in wanted:
-                if k >= runs_of(p, main):
-                    continue
-                frames = v.get("frames", FRAMES) if k == 0 and p.default and main else 0
-                aside = {case.need("aside"): ASIDE[k]}
-                made_with = "\n".join([*texts, fix if p.family not in (UNCULLED, BY_HAND) else ""])
-                jobs.append(CaseJob(case, scene, p, k, out / case.name / "runs", {**given, **aside}, frames, launcher, made_with, ranks))
+        jobs += maker.jobs(scene, [(p, k) for k in range(max(runs_of(p, main) for p in wanted)) for p in wanted if k < runs_of(p, main)])
     return jobs
 
 

@@ -1,6 +1,7 @@
-"""validation/run.sh [--quick|--full] [--report-only|--few-steps] [--publish] [--also KEYWORDS] [--ranks N] [--at-once N] [CASE ...]
+"""validation/run.sh [--quick|--full] [--decide|--no-decide] [--report-only|--few-steps] [--publish] [--also KEYWORDS] [--ranks N] [--at-once N] [CASE ...]
 
-Runs cases, unculled and culled, and writes the report. What was run before, with the same deck and the same fix, is not run again:
+Runs cases, unculled and culled, and writes the report. `--decide`, a part of `--full`: pairs of runs are added until each metric is
+equivalent or outside, 30 at most. What was run before, with the same deck and the same fix, is not run again:
 after a kill the same command goes on. `--few-steps`: each deck once unculled and once culled, cut short; no report.
 Exit: 0 the report is written and nothing is lost, 1 a granule is lost, 2 a case or run failed (one line each).
 """
@@ -13,7 +14,7 @@ from .. import engine, errors
 from ..dumps import read_final
 from ..errors import RunError
 from ..twins import cores
-from . import case_results, case_runs, cases, report, short_cases, slices
+from . import case_results, case_runs, cases, deciding, report, sequential, short_cases, slices
 from .points import SLEEP, UNCULLED
 
 HERE = engine.ROOT / "validation"
@@ -28,6 +29,8 @@ def options(argv):
     how = p.add_mutually_exclusive_group()
     how.add_argument("--report-only", action="store_true", help="run nothing; write the report of the results that there are")
     how.add_argument("--few-steps", action="store_true", help="each deck for a few steps: that all of it still runs")
+    p.add_argument("--decide", action=argparse.BooleanOptionalAction, default=None,
+                   help=f"add pairs of runs, up to {sequential.LOOKS[-1]}, until each metric is equivalent or outside (default: with --full)")
     p.add_argument("--also", action="append", default=[], metavar="KEYWORDS", help="a point more: these keywords of the fix; may be repeated")
     p.add_argument("--ranks", type=int, default=1, metavar="N", help="of each run; on more than one, the defaults alone beside unculled runs")
     p.add_argument("--at-once", type=int, default=None, metavar="N", help="runs at the same time (default: one rank a core)")
@@ -40,6 +43,8 @@ def options(argv):
         p.error("--publish takes all cases, --full, and neither --few-steps nor --also nor --ranks")
     if a.ranks < 1 or (a.few_steps and a.ranks != 1):
         p.error("--ranks takes 1 or more, and not with --few-steps")
+    if a.decide is None:
+        a.decide = a.size == "full"
     if a.at_once is None:
         a.at_once = max(1, cores() // a.ranks)
     if a.at_once < 1:
@@ -51,10 +56,14 @@ def say(line):
     print(line, flush=True)
 
 
-def run_case(case, jobs, course, out):
-    """Runs it and leaves its results; the lines of what failed."""
+def run_case(case, jobs, course, out, maker=None):
+    """Runs it and leaves its results; the lines of what failed. `maker`: of more runs, until its metrics are decided."""
     done = case_runs.run_all(jobs, course)
-    result = case_results.result_of(case, done)
+    while maker and (wanted := deciding.further(case, done)):
+        more = [job for scene, of_scene in wanted.items() for job in maker.jobs(scene, of_scene)]
+        course.add(more)
+        done |= case_runs.run_all(more, course)
+    result = case_results.result_of(case, done, bool(maker))
     draw(case, done, out / case.name / "what_moves.png")
     file = case_results.results_file(out, case)
     part = file.with_suffix(".part")
@@ -96,7 +105,8 @@ def run(a):
         course = case_runs.Course([job for of_case in jobs.values() for job in of_case], a.at_once, say)
         for case, of_case in jobs.items():
             try:
-                failed += run_case(case, of_case, course, out)
+                maker = case_runs.Maker(case, out, beds, launcher, fix, a.ranks) if a.decide else None
+                failed += run_case(case, of_case, course, out, maker)
             except RunError as e:
                 failed.append(str(e))
                 say(f"{case.name}: {e}")
@@ -109,11 +119,16 @@ def run(a):
             say(f"{case.name} has no results; run it first")
     folder = a.report or HERE / "report" / size
     folder.parent.mkdir(parents=True, exist_ok=True)
-    page = report.write(results, folder, out, f"Made by `validation/run.sh --{a.size}{f' --ranks {a.ranks}' if a.ranks > 1 else ''}`.")
+    page = report.write(results, folder, out, f"Made by `validation/run.sh --{a.size}{said(a)}{f' --ranks {a.ranks}' if a.ranks > 1 else ''}`.")
     say(f"report: {folder / 'README.md'} and {folder / 'report.html'}")
     if a.publish:
         report.publish(results, page, folder, HERE.parent)
     return told(failed) or int(any(r["lost"] for r in results))
+
+
+def said(a):
+    """The option of deciding, where it is not what the size says."""
+    return "" if a.decide == (a.size == "full") else " --decide" if a.decide else " --no-decide"
 
 
 def told(failed):

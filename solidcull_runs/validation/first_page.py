@@ -8,7 +8,7 @@ import json
 from ..engine import ROOT
 from ..errors import RunError, command
 from ..plots import plt
-from . import kept_figures, pages
+from . import kept_figures, pages, verdicts
 from .points import SLEEP
 
 CASES, SCALE, PLOT = "validation/results.json", "validation/scale/results.json", "validation/scale/times.png"
@@ -51,15 +51,29 @@ def most_off(record):
 
 
 def named(figure):
-    return f"{figure['figure']} {percent(figure['percent'])}"
+    """A figure and how far it is off; where pairs were added until that was decided, within what it is equal or by how much it differs."""
+    if "pairs" not in figure:
+        return f"{figure['figure']} {percent(figure['percent'])}"
+    if figure["unit"] != "%":
+        return f"{figure['figure']} {kept_figures.told(figure).rpartition(': ')[2]}"
+    if figure["verdict"] == verdicts.OTHER:
+        return f"{figure['figure']} differs by {percent(abs(figure['by']))}"
+    if figure["verdict"] == verdicts.SAME:
+        return f"{figure['figure']} equal within {percent(max(abs(figure['low']), abs(figure['high'])))}"
+    return f"{figure['figure']} {figure['low']:+.2g} to {figure['high']:+.2g} %"
+
+
+def is_beyond(figure):
+    """Whether it is off by more than its page allows; where pairs were added, whether that may be."""
+    return figure["verdict"] != verdicts.SAME if "pairs" in figure else figure["margins"] > 1
 
 
 def off_by(main, others):
     """What is farther off than its page allows, in all scenes; else what is farthest off in the main one. And the figure of the main
     scene that is told of first."""
-    beyond = [f for f in main["off"] if f["margins"] > 1]
+    beyond = [f for f in main["off"] if is_beyond(f)]
     told = [named(f) for f in beyond] + [f"{record['scene']}: {named(f)}" for record in others for f in record["off"]
-                                         if f["margins"] > 1 and f["percent"] is not None]
+                                         if is_beyond(f) and f["percent"] is not None]
     first = beyond[0] if beyond else most_off(main)
     return (f"**{'; '.join(told)}**" if told else named(first)), first
 

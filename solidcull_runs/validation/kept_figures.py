@@ -8,7 +8,7 @@ import statistics
 from pathlib import Path
 
 from ..errors import RunError
-from . import verdicts
+from . import sequential, verdicts
 from .points import LIVE, SLEEP
 
 
@@ -27,14 +27,40 @@ def text_of(records):
 
 
 def figure_off(metric, verdict, unculled):
-    """How far a figure is off by the line, and how far the unculled runs lie apart: in per cent of their mean, and in margins."""
+    """How far a figure is off by the line, and how far the first unculled runs lie apart: in per cent of their mean, and in margins.
+    As many of them as the first look has, for more would lie farther apart."""
     values = list(verdicts.values_of(unculled, metric["name"]).values())
+    first = values[:sequential.LOOKS[0]]
     mean = sum(values) / len(values)
 
     def percent(part):
         return round(100 * abs(part / mean), 2) if mean else None
-    return {"figure": metric["name"], "percent": percent(verdict.difference), "margins": round(verdict.in_margins, 2),
-            "scatter": percent(max(values) - min(values)), "verdict": verdict.word}
+    figure = {"figure": metric["name"], "percent": percent(verdict.difference), "margins": round(verdict.in_margins, 2),
+              "scatter": percent(max(first) - min(first)), "verdict": verdict.word}
+    if verdict.pairs:
+        unit, scale = ("%", 100 / abs(mean)) if metric["relative"] and mean else (metric["unit"], 1)
+        low, high, by = (float(f"{scale * x:.3g}") for x in (verdict.low, verdict.high, verdict.difference))
+        reach = max(abs(verdict.low), abs(verdict.high)) / verdict.margin if verdict.margin else None
+        figure |= {"pairs": verdict.pairs, "unit": unit, "low": low, "high": high, "by": by, "reach": reach and round(reach, 2)}
+    return figure
+
+
+def told(figure):
+    """The verdict on a figure, in words. With pairs that were added until it was decided: within what the runs are equal, or by how
+    much they differ; in per cent of the unculled mean, or in the figure's unit where its margin is."""
+    if "pairs" not in figure:
+        return figure["verdict"]
+    if figure["verdict"] == verdicts.SAME:
+        return f"equal within {max(abs(figure['low']), abs(figure['high'])):.2g} {figure['unit']}"
+    if figure["verdict"] == verdicts.OTHER:
+        return f"differs by {abs(figure['by']):.2g} {figure['unit']}"
+    return f"not decided after {figure['pairs']} pairs: {figure['low']:+.2g} to {figure['high']:+.2g} {figure['unit']}"
+
+
+def most_telling(record):
+    """Of a record's figures that have its verdict, the one that is farthest off in margins, interval and all."""
+    alike = [f for f in record["off"] if f["verdict"] == record["verdict"]]
+    return max(alike, key=lambda f: f.get("reach") or f["margins"], default=record["off"][0])
 
 
 def records_of(result):

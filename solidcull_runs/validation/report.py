@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 from ..errors import RunError
-from . import first_page, kept_figures, pages, report_plots, verdicts
+from . import first_page, kept_figures, pages, report_plots, sequential, verdicts
 from .points import BY_HAND, LIVE, PAPER, SLEEP
 
 BEGIN = "<!-- made by validation/run.sh --publish -->"
@@ -31,8 +31,16 @@ def overview_row(records, title):
             cells += ["-", "-", "not run"]
             continue
         worst = record["off"][0]
-        cells += [f"{record['faster']:.2f}", f"{worst['margins']:.2f} ({worst['figure']})", record["verdict"]]
+        cells += [f"{record['faster']:.2f}", f"{worst['margins']:.2f} ({worst['figure']})", verdict_of(record)]
     return cells
+
+
+def verdict_of(record):
+    """In words. Where pairs were added, that of the figure that says most, and the pairs that the last figure took."""
+    figure = kept_figures.most_telling(record)
+    if "pairs" not in figure:
+        return record["verdict"]
+    return f"{kept_figures.told(figure)} ({figure['figure']}); {max(f['pairs'] for f in record['off'])} pairs"
 
 
 def overview_rows(records, titles):
@@ -60,6 +68,10 @@ def overview(page, results, folder, how):
               "granules are 10 mm wide by 100 µm. Culled runs start from the same restart file. An error is what a culled run differs from the unculled one that starts alike, mean of all pairs. It is given in margins, "
               "which each case's README has fixed before. The verdict is that of two one-sided tests at 5 %: `equivalent`, "
               "`outside`, or `not decided` where the runs scatter too much to tell. Time is that of a core in LIGGGHTS's loop.")
+    if any(r.get("decided") for r in results):
+        page.text(f"At the defaults, pairs of runs were added until each metric was decided, {sequential.LOOKS[-1]} at most. *Equal within x %* says that the "
+                  "difference is smaller than the margin, and than x % of the unculled mean. *Differs by x %* says that it is larger than the margin. "
+                  f"Looks were taken after {', '.join(map(str, sequential.LOOKS))} pairs. In all of them together, either is said by chance in less than 5 %.")
     records, titles = [record for r in results for record in kept_figures.records_of(r)], {r["case"]: r["title"] for r in results}
     page.table(OVERVIEW, overview_rows(records, titles))
     outside = outside_rows(records, titles)
@@ -81,7 +93,7 @@ def metric_rows(result, judged):
     """Head and rows of the table of a case's metrics: unculled, and at the defaults."""
     unculled = verdicts.unculled_of(verdicts.main_scene(result))
     defaults = [j for j in (verdicts.default_of(judged, SLEEP), verdicts.default_of(judged, LIVE)) if j]
-    rows = []
+    added, rows = any(v.pairs for j in defaults for v in j.verdicts.values()), []
     for m in result["metrics"]:
         values = list(verdicts.values_of(unculled, m["name"]).values())
         mean = sum(values) / len(values)
@@ -89,11 +101,12 @@ def metric_rows(result, judged):
                f"{100 * m['margin']:g} %" if m["relative"] else f"{m['margin']:g}"]
         for j in defaults:
             v = j.verdicts[m["name"]]
-            row += [f"{mean + v.difference:.4g}", f"{v.low:+.2g} to {v.high:+.2g}", v.word]
+            row += [f"{mean + v.difference:.4g}", f"{v.low:+.2g} to {v.high:+.2g}", kept_figures.told(kept_figures.figure_off(m, v, unculled))]
+            row += [v.pairs] * added
         rows.append(row)
     head = ["metric", "unculled", "least to largest", "margin"]
     for j in defaults:
-        head += [f"`{j.family}`", "difference lies in", "verdict"]
+        head += [f"`{j.family}`", "difference lies in", "verdict"] + ["pairs"] * added
     return head, rows
 
 
@@ -132,6 +145,8 @@ def case_section(page, result, folder, runs_folder):
         if others:
             page.table([f"scene {scene}", "times faster", "largest error, in margins", "of", "verdict"],
                        [[f"`{j.name}`", f"{j.speed_up:.2f}", f"{j.error:.2f}", j.worst, j.word] for j in others.values()])
+            if result.get("decided"):
+                page.table(*metric_rows({**result, "scenes": {scene: of}}, others))
     if result["laws"]:
         families = ["unculled", SLEEP, LIVE]
         page.table(["law", "known", *families], [[law["what"], law["known"], *(figure_of(law["values"].get(f)) for f in families)] for law in result["laws"]])

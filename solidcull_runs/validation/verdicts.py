@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from . import sequential
 from .points import UNCULLED
 
 LEVEL = 0.05  # of each of the two tests
@@ -21,6 +22,7 @@ class Verdict:
     low: float         # the difference lies between these, by LEVEL on either side
     high: float
     margin: float
+    pairs: int = None  # of how many pairs, where pairs were added until it was decided
 
     @property
     def in_margins(self):
@@ -43,6 +45,26 @@ def two_one_sided_tests(unculled, culled, margin):
     low, high = difference - half, difference + half
     word = SAME if -margin < low and high < margin else OTHER if low > margin or high < -margin else OPEN
     return Verdict(word, difference, low, high, margin)
+
+
+def in_looks(unculled, culled, margin_of):
+    """The same verdicts where pairs are added until there is one (see sequential.py): that of the first look that decides, else that of
+    all pairs, OPEN. `margin_of(mean)`: of the unculled runs. In all looks together, a metric at its margin's edge is called SAME or
+    OTHER by chance in less than LEVEL of cases."""
+    numbers = sorted(set(unculled) & set(culled))
+    if len(numbers) < 2:
+        raise ValueError(f"{len(numbers)} pairs cannot be judged")
+    looks = [n for n in sequential.LOOKS if n < len(numbers)] + [len(numbers)]
+    for n in looks:
+        taken = numbers[:n]
+        margin = margin_of(statistics.fmean(unculled[k] for k in taken))
+        difference, low, high = sequential.interval([culled[k] - unculled[k] for k in taken])
+        word = SAME if -margin < low and high < margin else OTHER if low > margin or high < -margin else OPEN
+        if word != OPEN and n >= sequential.LOOKS[0]:
+            break
+    else:
+        word = OPEN
+    return Verdict(word, difference, low, high, margin, n)
 
 
 def noise(unculled):
@@ -115,10 +137,13 @@ def unculled_of(scene):
     return next((entry for entry in scene["points"].values() if entry["family"] == UNCULLED), None)
 
 
-def verdict(metric, unculled, culled):
-    mean = statistics.fmean(unculled.values())
-    allowed = metric["margin"] * abs(mean) if metric["relative"] else metric["margin"]
-    return two_one_sided_tests(unculled, culled, allowed)
+def verdict(metric, unculled, culled, added=False):
+    """On a metric. `added`: pairs were added until it was decided."""
+    def allowed(mean):
+        return metric["margin"] * abs(mean) if metric["relative"] else metric["margin"]
+    if added:
+        return in_looks(unculled, culled, allowed)
+    return two_one_sided_tests(unculled, culled, allowed(statistics.fmean(unculled.values())))
 
 
 def judge(result, scene=None):
@@ -137,9 +162,10 @@ def judge(result, scene=None):
         def mean(count, entry=entry):
             there = [r["counts"][count] for r in entry["runs"] if count in r["counts"]]
             return statistics.fmean(there) if there else None
+        added = result.get("decided", False) and entry["default"] and len(entry["runs"]) > 1
         judged[name] = Judged(name, entry["family"], entry["absolute"], entry["share"], entry["default"], len(entry["runs"]), seconds,
                               seconds / whole, mean("exterior"), mean("interface"), mean("restored"),
-                              {m["name"]: verdict(m, values_of(unculled, m["name"]), values_of(entry, m["name"])) for m in result["metrics"]})
+                              {m["name"]: verdict(m, values_of(unculled, m["name"]), values_of(entry, m["name"]), added) for m in result["metrics"]})
     return judged
 
 
