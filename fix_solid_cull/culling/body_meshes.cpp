@@ -1,7 +1,10 @@
 #include "body_meshes.h"
 
 #include <algorithm>
+#include <map>
 #include <utility>
+
+#include "box.h"
 
 namespace solidcull {
 
@@ -61,15 +64,20 @@ void BodyMeshes::update() {
   SphereCells exterior;
   exterior.build(exterior_granules(), 2 * bed_.scales.diameter());
   const GranuleStore& store = bed_.solid.store();
+  // a mesh that is made as a whole asks for all of space: what is in the box of its own body will do
+  std::map<int, Box> stored;
+  store.for_each_body([&](int body, const Vec3& lo, const Vec3& hi) { stored[body] = {lo, hi}; });
   for (auto& [body, mesh] : meshes_) {
     mesh.set_pose(bed_.solid.bodies().pose(body));
     SphereCells interface;
     const auto found = shell.find(body);
     if (found != shell.end()) interface.build(found->second, 2 * bed_.scales.diameter());
     const InterfaceMesh::Gather members = [&, body = body](const Vec3& lo, const Vec3& hi, const auto& visit) {
-      store.for_each_in_box(store.frame_of(body), lo, hi, [&](const Resident& g) {
-        if (g.body == body) visit({g.position, g.radius});
-      });
+      if (const auto own = stored.find(body); own != stored.end())
+        store.for_each_in_box(store.frame_of(body), lo.cwiseMax(own->second.lo), hi.cwiseMin(own->second.hi),
+                              [&](const Resident& g) {
+                                if (g.body == body) visit({g.position, g.radius});
+                              });
       interface.for_each_in_box(lo, hi, [&](std::size_t, const Sphere& s) {
         visit(s);
         return true;
