@@ -85,6 +85,19 @@ InterfaceMesh::~InterfaceMesh() = default;
 InterfaceMesh::InterfaceMesh(InterfaceMesh&&) noexcept = default;
 InterfaceMesh& InterfaceMesh::operator=(InterfaceMesh&&) noexcept = default;
 
+InterfaceMesh InterfaceMesh::around(std::vector<Sphere> spheres, double voxel, double closing) {
+  InterfaceMesh mesh(voxel, closing);
+  mesh.impl_->grid = level_set::closed_union(std::move(spheres), closing, voxel);
+  return mesh;
+}
+
+InterfaceMesh InterfaceMesh::copy() const {
+  InterfaceMesh mesh(impl_->voxel, impl_->closing);
+  mesh.impl_->grid = impl_->grid->deepCopy();
+  mesh.impl_->pose = impl_->pose;
+  return mesh;
+}
+
 void InterfaceMesh::set_pose(const Pose& pose) { impl_->pose = pose; }
 const Pose& InterfaceMesh::pose() const { return impl_->pose; }
 

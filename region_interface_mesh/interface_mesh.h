@@ -32,6 +32,10 @@ class InterfaceMesh {
   ~InterfaceMesh();
   InterfaceMesh(InterfaceMesh&&) noexcept;
   InterfaceMesh& operator=(InterfaceMesh&&) noexcept;
+  /// Around these spheres, once, in the world's frame (m). Small ones are held as by update().
+  static InterfaceMesh around(std::vector<Sphere> spheres, double voxel, double closing);
+  /// The same surface; its upkeep begins anew.
+  InterfaceMesh copy() const;
   InterfaceMesh(const InterfaceMesh&) = delete;
   InterfaceMesh& operator=(const InterfaceMesh&) = delete;
 

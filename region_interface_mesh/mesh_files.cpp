@@ -9,20 +9,12 @@
 #include <limits>
 #include <numeric>
 #include <stdexcept>
-#include <string_view>
 #include <utility>
 
+#include "poly_data.h"
 #include "whole_file.h"
 
 namespace solidcull {
-
-const char* const poly_data_begins =
-    "<?xml version=\"1.0\"?>\n"
-    "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
-    "  <PolyData>\n";
-const char* const poly_data_ends = "  </PolyData>\n</VTKFile>\n";
-
-static_assert(sizeof(float) == 4 && sizeof(int) == 4, "the files hold 32-bit numbers");
 
 void check_folder_of(const std::string& file) {
   const std::size_t slash = file.rfind('/');
@@ -61,134 +53,6 @@ void WholeFile::commit() {
   committed_ = true;
 }
 
-namespace {
-
-// --- base64, as VTK reads it ----------------------------------------------------------------------------------------
-
-/// What is written to, where it is no file.
-struct Text {
-  std::string all;
-  void write(std::string_view more) { all += more; }
-};
-
-/// Encodes a stream of bytes piece by piece; VTK wants the length and the data of an array in one such stream.
-template <class To>
-class Base64 {
- public:
-  explicit Base64(To& file) : file_(file) { text_.reserve(flush_at + 4); }
-
-  void put(const void* data, std::size_t bytes) {
-    const auto* byte = static_cast<const unsigned char*>(data);
-    for (std::size_t n = 0; n < bytes; ++n) {
-      group_[filled_++] = byte[n];
-      if (filled_ == 3) put_group();
-    }
-  }
-
-  void end() {
-    if (filled_ > 0) {
-      const int missing = 3 - filled_;
-      std::fill(group_ + filled_, group_ + 3, 0);
-      put_group();
-      std::fill(text_.end() - missing, text_.end(), '=');
-    }
-    flush();
-  }
-
- private:
-  static constexpr std::size_t flush_at = 1 << 16;
-
-  void put_group() {
-    static constexpr char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    const std::uint32_t bits = group_[0] << 16 | group_[1] << 8 | group_[2];
-    for (const int shift : {18, 12, 6, 0}) text_ += digit[bits >> shift & 63];
-    filled_ = 0;
-    // end() pads the last group, so that group must still be here.
-    if (text_.size() >= flush_at) pending_flush();
-  }
-  void pending_flush() {
-    file_.write(std::string_view(text_).substr(0, text_.size() - 4));
-    text_.erase(0, text_.size() - 4);
-  }
-  void flush() {
-    file_.write(text_);
-    text_.clear();
-  }
-
-  To& file_;
-  std::string text_;
-  unsigned char group_[3] = {};
-  int filled_ = 0;
-};
-
-template <class T>
-constexpr const char* vtk_type();
-template <>
-constexpr const char* vtk_type<float>() {
-  return "Float32";
-}
-template <>
-constexpr const char* vtk_type<int>() {
-  return "Int32";
-}
-template <>
-constexpr const char* vtk_type<std::int64_t>() {
-  return "Int64";
-}
-
-template <class To, class T>
-void write_array(To& file, const std::string& name, const std::vector<T>& values, int components = 1) {
-  file.write(std::string("        <DataArray type=\"") + vtk_type<T>() + "\" Name=\"" + name + "\" NumberOfComponents=\"" +
-             std::to_string(components) + "\" format=\"binary\">");
-  Base64<To> encoded(file);
-  const std::uint64_t bytes = values.size() * sizeof(T);
-  encoded.put(&bytes, sizeof bytes);
-  encoded.put(values.data(), bytes);
-  encoded.end();
-  file.write("</DataArray>\n");
-}
-
-/// On many ranks bodies have numbers that an Int32 does not hold.
-template <class To>
-void write_numbers_of_bodies(To& file, const std::vector<std::int64_t>& body) {
-  const bool narrow = std::all_of(body.begin(), body.end(), [](std::int64_t b) { return b == static_cast<int>(b); });
-  if (narrow)
-    write_array(file, "body", std::vector<int>(body.begin(), body.end()));
-  else
-    write_array(file, "body", body);
-}
-
-template <class To>
-void begin_piece(To& file, std::size_t points, std::size_t verts, std::size_t polys) {
-  file.write("    <Piece NumberOfPoints=\"" + std::to_string(points) + "\" NumberOfVerts=\"" + std::to_string(verts) +
-             "\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" + std::to_string(polys) + "\">\n");
-}
-
-template <class To>
-void end_piece(To& file) {
-  file.write("    </Piece>\n");
-}
-
-template <class To>
-void write_points(To& file, const std::vector<float>& position) {
-  file.write("      <Points>\n");
-  write_array(file, "Points", position, 3);
-  file.write("      </Points>\n");
-}
-
-/// Cells of equal size: their point indices one after another, and where each cell ends.
-template <class To>
-void write_cells(To& file, const std::string& kind, const std::vector<std::int64_t>& connectivity, int size) {
-  std::vector<std::int64_t> ends(connectivity.size() / size);
-  for (std::size_t n = 0; n < ends.size(); ++n) ends[n] = static_cast<std::int64_t>(n + 1) * size;
-  file.write("      <" + kind + ">\n");
-  write_array(file, "connectivity", connectivity);
-  write_array(file, "offsets", ends);
-  file.write("      </" + kind + ">\n");
-}
-
-}  // namespace
-
 // --- the files --------------------------------------------------------------------------------------------------
 
 void write_stl(const std::string& file, const TriangleMesh& mesh) {
@@ -218,76 +82,82 @@ void write_stl(const std::string& file, const TriangleMesh& mesh) {
   out.commit();
 }
 
-void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<std::int64_t>& body_of_triangle) {
-  if (!body_of_triangle.empty() && body_of_triangle.size() != mesh.triangles.size())
-    throw std::invalid_argument("write_vtp: " + std::to_string(body_of_triangle.size()) + " body numbers for " +
-                                std::to_string(mesh.triangles.size()) + " triangles");
-  std::vector<float> position;
-  position.reserve(3 * mesh.vertices.size());
-  for (const Vec3& v : mesh.vertices)
-    for (int d = 0; d < 3; ++d) position.push_back(static_cast<float>(v[d]));
-  std::vector<std::int64_t> connectivity;
-  connectivity.reserve(3 * mesh.triangles.size());
-  for (const auto& t : mesh.triangles) connectivity.insert(connectivity.end(), t.begin(), t.end());
-
-  WholeFile out(file);
-  out.write(poly_data_begins);
-  begin_piece(out, mesh.vertices.size(), 0, mesh.triangles.size());
-  if (!body_of_triangle.empty()) {
-    out.write("      <CellData Scalars=\"body\">\n");
-    write_numbers_of_bodies(out, body_of_triangle);
-    out.write("      </CellData>\n");
-  }
-  write_points(out, position);
-  write_cells(out, "Polys", connectivity, 3);
-  end_piece(out);
-  out.write(poly_data_ends);
-  out.commit();
-}
-
 namespace {
 
-/// wide: bodies are numbered alike in all parts of a file.
-template <class To>
-void write_bed_piece(To& out, const BedTable& bed, bool wide) {
-  const std::size_t n = bed.radius.size();
-  const bool whole = bed.position.size() == 3 * n && bed.velocity.size() == 3 * n && bed.tag.size() == n &&
-                     bed.type.size() == n && bed.state.size() == n && bed.body.size() == n;
-  if (!whole) throw std::invalid_argument("a bed file: the columns of the bed differ in length");
-  std::vector<std::int64_t> connectivity(n);
-  std::iota(connectivity.begin(), connectivity.end(), 0);
-
-  begin_piece(out, n, n, 0);
-  out.write("      <PointData Scalars=\"state\" Vectors=\"velocity\">\n");
-  write_array(out, "radius", bed.radius);
-  write_array(out, "velocity", bed.velocity, 3);
-  write_array(out, "tag", bed.tag);
-  write_array(out, "type", bed.type);
-  write_array(out, "state", bed.state);
+/// On many ranks bodies have numbers that an Int32 does not hold.
+void add_numbers_of_bodies(PolyDataPiece& piece, const std::vector<std::int64_t>& body, bool wide) {
+  wide = wide || std::any_of(body.begin(), body.end(), [](std::int64_t b) { return b != static_cast<int>(b); });
   if (wide)
-    write_array(out, "body", bed.body);
+    piece.add("body", body);
   else
-    write_numbers_of_bodies(out, bed.body);
-  out.write("      </PointData>\n");
-  write_points(out, bed.position);
-  write_cells(out, "Verts", connectivity, 1);
-  end_piece(out);
+    piece.add("body", std::vector<int>(body.begin(), body.end()));
+}
+
+void write_poly_data(const std::string& file, const PolyDataPiece& piece, double time) {
+  WholeFile out(file);
+  out.write(poly_data_begins(time));
+  out.write(piece.head(0));
+  out.write(poly_data_middle);
+  out.write(piece.data());
+  out.write(poly_data_ends);
+  out.commit();
 }
 
 }  // namespace
 
-std::string bed_piece(const BedTable& bed) {
-  Text text;
-  write_bed_piece(text, bed, true);
-  return std::move(text.all);
+void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<std::int64_t>& body_of_triangle,
+               double time) {
+  if (!body_of_triangle.empty() && body_of_triangle.size() != mesh.triangles.size())
+    throw std::invalid_argument("write_vtp: " + std::to_string(body_of_triangle.size()) + " body numbers for " +
+                                std::to_string(mesh.triangles.size()) + " triangles");
+  if (mesh.triangles.size() > std::numeric_limits<int>::max() / 3)
+    WholeFile(file).fail(std::to_string(mesh.triangles.size()) + " triangles are more than its 32-bit numbers can count");
+  std::vector<float> position;
+  position.reserve(3 * mesh.vertices.size());
+  for (const Vec3& v : mesh.vertices)
+    for (int d = 0; d < 3; ++d) position.push_back(static_cast<float>(v[d]));
+  std::vector<int> connectivity;
+  connectivity.reserve(3 * mesh.triangles.size());
+  for (const auto& t : mesh.triangles)
+    for (const std::uint32_t corner : t) connectivity.push_back(static_cast<int>(corner));
+
+  PolyDataPiece piece(mesh.vertices.size(), 0, mesh.triangles.size());
+  if (!body_of_triangle.empty()) {
+    piece.begin("CellData Scalars=\"body\"");
+    add_numbers_of_bodies(piece, body_of_triangle, false);
+  }
+  piece.begin("Points");
+  piece.add("Points", position, 3);
+  piece.add_cells("Polys", connectivity, 3);
+  write_poly_data(file, piece, time);
 }
 
-void write_bed_vtp(const std::string& file, const BedTable& bed) {
-  WholeFile out(file);
-  out.write(poly_data_begins);
-  write_bed_piece(out, bed, false);
-  out.write(poly_data_ends);
-  out.commit();
+PolyDataPiece bed_piece(const BedTable& bed, bool wide) {
+  const std::size_t n = bed.radius.size();
+  const bool whole = bed.position.size() == 3 * n && bed.velocity.size() == 3 * n && bed.id.size() == n && bed.type.size() == n &&
+                     bed.state.size() == n && bed.body.size() == n && (bed.spin.empty() || bed.spin.size() == 3 * n);
+  if (!whole) throw std::invalid_argument("a bed file: the columns of the bed differ in length");
+  std::vector<int> connectivity(n);
+  std::iota(connectivity.begin(), connectivity.end(), 0);
+
+  PolyDataPiece piece(n, n, 0);
+  piece.begin("PointData Scalars=\"state\" Vectors=\"v\"");
+  piece.add("id", bed.id);
+  piece.add("radius", bed.radius);
+  piece.again("pscale");
+  piece.add("v", bed.velocity, 3);
+  if (!bed.spin.empty()) piece.add("w", bed.spin, 3);
+  piece.add("type", bed.type);
+  piece.add("state", bed.state);
+  add_numbers_of_bodies(piece, bed.body, wide);
+  piece.begin("Points");
+  piece.add("Points", bed.position, 3);
+  piece.add_cells("Verts", connectivity, 1);
+  return piece;
+}
+
+void write_bed_vtp(const std::string& file, const BedTable& bed, double time) {
+  write_poly_data(file, bed_piece(bed, false), time);
 }
 
 }  // namespace solidcull

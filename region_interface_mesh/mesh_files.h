@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "interface_mesh.h"
+#include "poly_data.h"
 
 namespace solidcull {
 
@@ -15,8 +16,8 @@ void check_folder_of(const std::string& file);
 void write_stl(const std::string& file, const TriangleMesh& mesh);
 
 /// VTK XML PolyData of triangles with one cell array "body" (empty, or one value per triangle), Int32 where that holds all
-/// values, else Int64. Local.
-void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<std::int64_t>& body_of_triangle);
+/// values, else Int64. time: s. Local.
+void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<std::int64_t>& body_of_triangle, double time);
 
 /// OpenVDB file with one level-set grid per mesh, named by `names`. Local.
 void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>& meshes, const std::vector<std::string>& names);
@@ -24,20 +25,20 @@ void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>&
 /// State of a granule in a bed file; the numbers stand in the file.
 enum class GranuleState : int { exterior = 0, interface_ = 1, interior = 2, waking = 3 };
 
-/// All granules of a bed, stored ones too, as columns of equal length (SI units, world frame).
+/// Granules of a bed, stored ones too, as columns of equal length (SI units, world frame).
 struct BedTable {
   std::vector<float> position;  // 3 per granule
   std::vector<float> velocity;  // 3 per granule
+  std::vector<float> spin;      // 3 per granule, or none at all
   std::vector<float> radius;
-  std::vector<int> tag, type, state;
+  std::vector<int> id, type, state;
   std::vector<std::int64_t> body;  // written as Int32 where that holds all values
 };
 
-/// VTK XML PolyData of points (one vertex cell each) with point arrays radius, velocity, tag, type, state, body.
-/// Arrays are inline base64 ("binary"), header_type UInt64, uncompressed, little endian.
-void write_bed_vtp(const std::string& file, const BedTable& bed);
-/// The same in parts, one behind the other: what stands before the first one and behind the last, and a part. Local.
-extern const char *const poly_data_begins, *const poly_data_ends;
-std::string bed_piece(const BedTable& bed);
+/// VTK XML PolyData of points (one vertex cell each) with point arrays id, radius, pscale (the same), v, w (the spin, if there is
+/// one), type, state, body. time: s. Local.
+void write_bed_vtp(const std::string& file, const BedTable& bed, double time);
+/// The same as one piece of several; wide: bodies are numbered alike in all of them. Local.
+PolyDataPiece bed_piece(const BedTable& bed, bool wide);
 
 }  // namespace solidcull

@@ -18,6 +18,7 @@ line and compared.
 | `few_steps` | what can be checked of a run after a few steps |
 | `tables` | comparisons as text |
 | `plots` | curves of runs of both kinds |
+| `vtp` | files of `bed` and `mesh`, and their times |
 | `cutaways` | pictures of a bed and its interface mesh, cut open |
 | `struck` | what is drawn of a bed that a ball strikes |
 | `kills` | a job on several ranks that is killed, and the newest restart file that it left |

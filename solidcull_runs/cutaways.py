@@ -1,54 +1,14 @@
 """Cut-away pictures of a bed and its interface mesh, from the .vtp files that `fix solid/cull` writes."""
-import base64
 import io
-import xml.etree.ElementTree as xml
-from pathlib import Path
 
 import numpy as np
 
-from . import plots
+from . import plots, vtp
 from .plots import STATES
 
 MESH = (0.72, 0.72, 0.72)
 STRIKER = (0.30, 0.30, 0.33)
 LIGHT = np.array([-0.35, -0.6, 0.72])  # towards the light, in (right, to the eye negative, up) of the picture
-VTK_TYPES = {"Float32": "<f4", "Float64": "<f8", "Int8": "<i1", "UInt8": "<u1", "Int32": "<i4", "UInt32": "<u4", "Int64": "<i8", "UInt64": "<u8"}
-
-
-def read_vtp(file):
-    """A VTK PolyData file (inline base64, UInt64 headers, uncompressed), in one piece or one of each rank: {"points", "polys"
-    (triangles), every array by name}."""
-    root = xml.parse(file).getroot()
-    if root.get("type") != "PolyData" or root.get("header_type") != "UInt64" or root.get("compressor"):
-        raise ValueError(f"{file}: not an uncompressed PolyData file with UInt64 headers")
-    pieces = [arrays_of(piece) for piece in root.findall("PolyData/Piece")]
-    if len(pieces) == 1:
-        return pieces[0]
-    pieces = [p for p in pieces if len(p["tag"])] or pieces[:1]  # a rank may have nothing
-    joined = {name: np.concatenate([p[name] for p in pieces]) for name in pieces[0]}
-    order = np.argsort(joined["tag"], kind="stable")
-    return {name: values[order] for name, values in joined.items()}
-
-
-def arrays_of(piece):
-    arrays = {}
-    for part in ("Points", "PointData", "CellData", "Polys"):
-        for a in piece.findall(f"{part}/DataArray"):
-            name = {"Points": "points"}.get(part, a.get("Name"))
-            text = "".join((a.text or "").split())
-            if "=" in text[:12]:  # the length stands in a base64 block of its own
-                data = base64.b64decode(text[12:])
-            else:
-                data = base64.b64decode(text)[8:]
-            values = np.frombuffer(data, VTK_TYPES[a.get("type")])
-            width = int(a.get("NumberOfComponents") or 1)
-            arrays[name] = values.reshape(-1, width) if width > 1 else values
-    arrays["points"] = arrays["points"].reshape(-1, 3).astype(float)
-    if "connectivity" in arrays:
-        arrays["polys"] = arrays.pop("connectivity").reshape(-1, 3)
-        arrays.pop("offsets", None)
-    return arrays
-
 
 class Picture:
     """A parallel projection with a depth buffer: from the front, `turn` degrees to the side, `tilt` from above."""
@@ -129,20 +89,6 @@ def cut_away(bed, mesh, cut, low, high, pixels=700, striker_radius=np.inf):
     return granules.image, surface.image
 
 
-def file_at(pattern, step):
-    """The file of a `*` pattern for a step, or None."""
-    file = Path(str(pattern).replace("*", str(step)))
-    return file if file.exists() else None
-
-
-def steps_of(pattern):
-    """The steps for which files of a `*` pattern exist."""
-    pattern = Path(pattern)
-    before, after = pattern.name.split("*")
-    names = (f.name[len(before):len(f.name) - len(after)] for f in pattern.parent.glob(pattern.name))
-    return sorted(int(n) for n in names if n.isdigit())
-
-
 def legend(figure, mesh=True):
     """The key of the colours, below the pictures."""
     from matplotlib.patches import Patch
@@ -168,5 +114,5 @@ def film_strip(moments, file):
 
 def cut_away_files(folder, step, cut, low, high, **how):
     """cut_away() of the files `bed.STEP.vtp` and `mesh.STEP.vtp`; None if there is no bed of that step."""
-    bed, mesh = (file_at(folder / f"{kind}.*.vtp", step) for kind in ("bed", "mesh"))
-    return cut_away(read_vtp(bed), read_vtp(mesh) if mesh else None, cut, low, high, **how) if bed else None
+    bed, mesh = (vtp.file_at(folder / f"{kind}.*.vtp", step) for kind in ("bed", "mesh"))
+    return cut_away(vtp.read(bed), vtp.read(mesh) if mesh else None, cut, low, high, **how) if bed else None

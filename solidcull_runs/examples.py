@@ -5,7 +5,7 @@ import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from . import cutaways, few_steps, tables
+from . import cutaways, few_steps, tables, vtp
 from .beds import settled
 from .comparisons import is_lost
 from .engine import ROOT
@@ -76,7 +76,7 @@ def load(name):
 
 def draw(example, out, runs):
     """Cut-away pictures; False when the fix has left no files to draw."""
-    steps = cutaways.steps_of(out / "bed.*.vtp")
+    steps = vtp.steps_of(out / "bed.*.vtp")
     moments = list(example.moments(out, steps, runs)) if steps else []
     if not moments or any(moment[1] is None for moment in moments):
         return False
@@ -107,7 +107,7 @@ def main(example):
     if example.prepare:
         example.prepare(out)
     bed = example.bed_file(a.few_steps)
-    for old in [f for kind in ("bed.*.vtp", "mesh.*.vtp", "mesh.*.vdb") for f in out.glob(kind)]:
+    for old in [f for kind in ("bed.*.vtp", "mesh.*.vtp", "mesh.*.vdb", "*.series") for f in out.glob(kind)]:
         old.unlink()
     variables = {"restart": bed.relative_to(example.here), "folder": out.relative_to(example.here), **(example.few if a.few_steps else {})}
     granules, steps = (example.few_granules, example.few_steps) if a.few_steps else (example.granules, example.steps)

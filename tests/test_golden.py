@@ -94,7 +94,7 @@ class Golden(unittest.TestCase):
         self.assertGreater(float(values["cull[5]"]), 0)
         self.assertEqual(f"{float(values['cull[5]']):.17g}", values["cull[5]"], "full precision")
         self.assertEqual(list(self.line_with(lines, "granules", 50)["granules"]), ["granules", "bodies", "x", "v", "omega", "f"])
-        self.assertEqual(list(lines[-2]["files"]), ["end.restart", "bed.0.vtp", "bed.550.vtp", "mesh.0.vtp", "mesh.550.vtp"])
+        self.assertEqual(list(lines[-2]["files"]), ["end.restart", "bed.000000000.vtp", "bed.000000550.vtp", "mesh.000000000.vtp", "mesh.000000550.vtp"])
         self.assertRegex(lines[-2]["said"][-1], "the restart file holds .* interior granules besides the atoms")
         hashes = [line["granules"]["x"] for line in lines if "granules" in line]
         self.assertEqual(len(set(hashes)), len(hashes), "something moves all the time")
@@ -108,7 +108,7 @@ class Golden(unittest.TestCase):
             self.line_with(lines, "values", 150)["values"]["cull[3]"] = "1"
 
         def another_file(lines):
-            lines[-2]["files"]["bed.550.vtp"] = "0" * 64
+            lines[-2]["files"]["bed.000000550.vtp"] = "0" * 64
 
         def another_end(lines):
             lines[-2]["end"]["omega"] = "0" * 64
@@ -121,7 +121,7 @@ class Golden(unittest.TestCase):
 
         self.assertEqual(self.compared_with(another_place), "tiny-1: differs from step 100: x")
         self.assertRegex(self.compared_with(another_value), r"^tiny-1: differs from step 150: cull\[3\] \d+ against 1$")
-        self.assertEqual(self.compared_with(another_file), "tiny-1: differs at the end: bed.550.vtp")
+        self.assertEqual(self.compared_with(another_file), "tiny-1: differs at the end: bed.000000550.vtp")
         self.assertEqual(self.compared_with(another_end), "tiny-1: differs at the end: omega")
         self.assertRegex(self.compared_with(another_message),
                          "^tiny-1: differs at the end: said: `fix cull .*` against `fix cull solid/cull: hello`$")

@@ -256,6 +256,7 @@ class KeywordRefusals(Case):
     FILE = STEPS + ", and a file name"
     MESH = "a file name that ends with .vdb, .stl or .vtp"
     BED = "a file name that ends with .vtp"
+    LEAST = "a whole number of granules, 1 or more, behind 'least'"
     # words after `solid/cull`: keyword that is named, its value (None: missing), what to give
     BALANCE = "a whole number of steps, 1 or more, and the largest work of a rank over the mean, more than 1"
     WRONG = {
@@ -273,6 +274,7 @@ class KeywordRefusals(Case):
         "report all": ("report", "all", "'short' or 'full'"), "report": ("report", None, "'short' or 'full'"),
         "voxel fine": ("voxel", "fine", VOXEL), "voxel 0.05": ("voxel", "0.05", VOXEL), "voxel": ("voxel", None, VOXEL),
         "mesh x a.stl": ("mesh", "x", FILE), "mesh 10 a.obj": ("mesh", "a.obj", MESH), "mesh 10": ("mesh", None, MESH),
+        "mesh 10 a.vtp least 0": ("mesh", "0", LEAST), "mesh 10 a.vtp skin least": ("mesh", None, LEAST), "mesh 10 a.vtp least all": ("mesh", "all", LEAST),
         "balance 0 1.1": ("balance", "0", BALANCE), "balance 50 1": ("balance", "1", BALANCE), "balance 50": ("balance", None, BALANCE),
         "bed 0 a.vtp": ("bed", "0", FILE), "bed 10 a.stl": ("bed", "a.stl", BED), "bed": ("bed", None, FILE),
     }
@@ -312,6 +314,14 @@ class KeywordRefusals(Case):
     def test_unknown_keyword(self):
         self.refused_by_fix(deck(FIX + " detph 2", granules=False), f"unknown keyword 'detph': choose from {self.KEYWORDS}")
 
+    def test_unknown_word_behind_a_file(self):
+        for words, name in (("bed 10 a.vtp sen", "sen"), ("bed 10 a.vtp surface", "surface"), ("bed 10 a.vtp seen b.vtp", "b.vtp")):
+            with self.subTest(words):
+                self.refused_by_fix(deck(f"{FIX} {words}", granules=False),
+                                    f"unknown keyword '{name}': choose from {self.KEYWORDS}; behind the file of 'bed' may stand 'seen' or 'spin'")
+        self.refused_by_fix(deck(f"{FIX} mesh 10 a.vtp seen", granules=False),
+                            f"unknown keyword 'seen': choose from {self.KEYWORDS}; behind the file of 'mesh' may stand 'surface', 'skin' or 'least K'")
+
     def test_voxel_too_coarse_for_depth(self):
         self.refused_by_fix(deck(FIX + " exterior live depth 1.5 voxel 2", granules=False),
                             "voxel 2.0 is too coarse for depth 1.5: choose voxel <= depth/2")
@@ -348,14 +358,16 @@ class FileRefusals(Case):
 
     def test_files_that_can_be_written_are(self):
         run = self.accepted(BLOCK + CULL_BLOCK + " bed 100 bed.*.vtp mesh 100 mesh.*.vdb\nrun 200\n")
-        for name in ("bed.0.vtp", "bed.100.vtp", "bed.200.vtp", "mesh.0.vdb", "mesh.100.vdb", "mesh.200.vdb"):
-            self.assertIn(name, run.files)
+        for step in ("000000000", "000000100", "000000200"):
+            self.assertIn(f"bed.{step}.vtp", run.files)
+            self.assertIn(f"mesh.{step}.vdb", run.files)
+        self.assertIn("bed.vtp.series", run.files)
         self.assertEqual([f for f in run.files if f.endswith(".part")], [])
 
     def test_a_run_begins_with_a_file_where_it_is_due_as_with_a_dump(self):
         outputs = " bed 100 bed.*.vtp\ndump d all custom 100 dump.* id\n"
         run = self.accepted(BLOCK + CULL_BLOCK + outputs + "run 0\nrun 100\nrun 50\nrun 50\nreset_timestep 300\nrun 0\n")
-        written = {end: {int(f.split(".")[1]) for f in run.files if f.startswith(end)} for end in ("bed.", "dump.")}
+        written = {end: {int(f.split(".")[1]) for f in run.files if f.startswith(end) and not f.endswith(".series")} for end in ("bed.", "dump.")}
         self.assertEqual(written["bed."], {0, 100, 200, 300})
         self.assertEqual(written["bed."], written["dump."])
 

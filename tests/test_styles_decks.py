@@ -471,7 +471,7 @@ class Decks(Case):
             columns = [line.split() for line in (self.place / f"d.{step}").read_text().splitlines()[9:]]
             self.assertEqual(sum(float(body) == 0 for _, body in columns), float(exterior))
             self.assertEqual(sum(float(body) > 0 for _, body in columns), float(shell))
-            self.assertIn('NumberOfPoints="344"', (self.place / f"all.{step}.vtp").read_bytes().decode("latin-1"))
+            self.assertIn('NumberOfPoints="344"', (self.place / f"all.{int(step):09d}.vtp").read_bytes().decode("latin-1"))
 
     def test_what_comes_between_two_runs(self):
         for later in LATER:

@@ -1,6 +1,5 @@
 """validation/twin.py and solidcull_runs: decks with and without the fix line, logs, figures, and each refusal by its text."""
 import ast
-import base64
 import contextlib
 import graphlib
 import io
@@ -14,6 +13,7 @@ import tempfile
 import time
 import types
 import unittest
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path[:0] = [str(ROOT), str(ROOT / "validation")]
 import twin  # noqa: E402
-from solidcull_runs import beds, comparisons, cutaways, decks, dumps, engine, errors, few_steps, halving, logs, measures, meshes, plots, shifts, tables, twins  # noqa: E402
+from solidcull_runs import beds, comparisons, cutaways, decks, dumps, engine, errors, few_steps, halving, logs, measures, meshes, plots, shifts, tables, twins, vtp  # noqa: E402
 
 DECK = """\
 variable dx index 0
@@ -554,34 +554,48 @@ class RealDecks(Folder):
 
 
 class Pictures(Folder):
-    def vtp(self, split):
-        def block(values):
-            data = np.asarray(values).tobytes()
-            head = np.uint64(len(data)).tobytes()
-            encode = base64.b64encode
-            return (encode(head) + encode(data) if split else encode(head + data)).decode()
+    def vtp(self, compressor="vtkZLibDataCompressor", size=1 << 18):
+        """A file of three granules and a triangle, as VTK's own writer makes it: blocks of `size` bytes."""
+        head, data = [], b""
 
         def array(name, kind, values, width=1):
-            return f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{width}" format="binary">{block(values)}</DataArray>'
+            nonlocal data
+            raw = np.asarray(values).tobytes()
+            blocks = [zlib.compress(raw[at:at + size]) for at in range(0, len(raw), size)]
+            place = len(data)
+            data += np.array([len(blocks), size, len(raw) % size, *map(len, blocks)], "<u8").tobytes() + b"".join(blocks)
+            return f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{width}" format="appended" offset="{place}"/>'
 
-        return self.write("bed.100.vtp", f"""<?xml version="1.0"?>
-<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64"><PolyData>
+        head = f"""<?xml version="1.0"?>
+<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64" compressor="{compressor}"><PolyData>
+<FieldData><DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">0.25</DataArray></FieldData>
 <Piece NumberOfPoints="3" NumberOfPolys="1">
 <PointData>{array("radius", "Float32", np.float32([1, 2, 3]))}{array("state", "Int32", np.int32([0, 1, 2]))}</PointData>
 <Points>{array("Points", "Float32", np.float32([0, 0, 0, 5, 0, 0, 0, 5, 0]), 3)}</Points>
 <Polys>{array("connectivity", "Int64", np.int64([0, 1, 2]))}{array("offsets", "Int64", np.int64([3]))}</Polys>
-</Piece></PolyData></VTKFile>""")
+</Piece></PolyData><AppendedData encoding="raw">_"""
+        file = self.folder / "bed.000000100.vtp"
+        file.write_bytes(head.encode() + data + b"</AppendedData></VTKFile>")
+        return file
 
-    def test_vtp_is_read_in_both_layouts(self):
-        for split in (False, True):
-            bed = cutaways.read_vtp(self.vtp(split))
+    def test_vtp_is_read_whatever_its_blocks(self):
+        for size in (8, 12, 1 << 18):
+            bed = vtp.read(self.vtp(size=size))
             self.assertEqual(bed["points"].tolist(), [[0, 0, 0], [5, 0, 0], [0, 5, 0]])
             self.assertEqual(bed["radius"].tolist(), [1, 2, 3])
             self.assertEqual(bed["polys"].tolist(), [[0, 1, 2]])
+            self.assertEqual(bed["time"], 0.25)
+
+    def test_other_vtp_files_are_named(self):
+        for file in (self.vtp(compressor="vtkLZ4DataCompressor"), self.write("other.vtp", "<VTKFile/>")):
+            with self.assertRaisesRegex(ValueError, f"{file.name}: no .vtp file of fix solid/cull"):
+                vtp.read(file)
 
     def test_steps_of_files(self):
-        self.vtp(False)
-        self.assertEqual(cutaways.steps_of(self.folder / "bed.*.vtp"), [100])
+        self.vtp()
+        self.assertEqual(vtp.steps_of(self.folder / "bed.*.vtp"), [100])
+        self.assertEqual(vtp.file_at(self.folder / "bed.*.vtp", 100), self.folder / "bed.000000100.vtp")
+        self.assertIsNone(vtp.file_at(self.folder / "bed.*.vtp", 200))
 
     def test_nearer_granules_hide_others(self):
         bed = {"points": np.array([[5.0, 2, 5], [5, 8, 5]]), "radius": np.array([1.0, 1]), "state": np.array([1, 2])}

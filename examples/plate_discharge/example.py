@@ -14,7 +14,7 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))
-from solidcull_runs import beds, comparisons, cutaways, dumps, engine, errors, few_steps, logs, plots, tables, twins  # noqa: E402
+from solidcull_runs import beds, comparisons, cutaways, dumps, engine, errors, few_steps, logs, plots, tables, twins, vtp  # noqa: E402
 from solidcull_runs.measures import rms  # noqa: E402
 
 TIME_STEP, START = 1e-4, 0.75                    # s: of LIGGGHTS; when the walls vanish
@@ -63,7 +63,7 @@ def history(run, out):
     """Times (s) and angles of both heaps, from files that hold every granule."""
     if run.counts:
         files = out / f"{run.name}.bed.*.vtp"
-        places = [(step, cutaways.read_vtp(cutaways.file_at(files, step))["points"]) for step in cutaways.steps_of(files)]
+        places = [(step, vtp.read(vtp.file_at(files, step))["points"]) for step in vtp.steps_of(files)]
     else:
         places = [(step, at) for step, _, at in dumps.snapshots(out / f"{run.name}.places")]
     return np.array([[step * TIME_STEP, *angles(at[:, 0], at[:, 1])] for step, at in places]).reshape(-1, 3).T
@@ -143,13 +143,13 @@ def plot(runs, file):
 def draw(run, out, file, pixels=900):
     """The whole scene from the front, at four moments, by state; False without bed files."""
     files = out / f"{run.name}.bed.*.vtp"
-    steps = cutaways.steps_of(files)
+    steps = vtp.steps_of(files)
     if not steps:
         return False
     shown = sorted({steps[round(k)] for k in np.linspace(0, len(steps) - 1, 4)})
     figure, axes = plots.plt.subplots(1, len(shown), squeeze=False, figsize=(4 * len(shown), 3.6))
     for ax, step in zip(axes[0], shown):
-        bed = cutaways.read_vtp(cutaways.file_at(files, step))
+        bed = vtp.read(vtp.file_at(files, step))
         # pictures look along y with z up: here they look along -z with y up, at the front half cut away
         at = bed["points"][:, [0, 2, 1]] * (1, -1, 1)
         front = at[:, 1] > -0.1

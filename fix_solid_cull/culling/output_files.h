@@ -8,6 +8,7 @@
 
 #include "bed.h"
 #include "body_meshes.h"
+#include "mesh_files.h"
 #include "report.h"
 
 namespace solidcull {
@@ -25,15 +26,25 @@ class OutputFiles {
   const std::map<int, InterfaceMesh>& ask_meshes();
 
  private:
-  void write_meshes(const std::string& file);
-  void write_bed(const std::string& file);
-  std::map<BodyGroups::Key, const InterfaceMesh*> whole_meshes(const std::map<int, InterfaceMesh>& here,
-                                                               std::map<BodyGroups::Key, InterfaceMesh>& parts);
-  std::string file_of_step(const std::string& pattern) const;
+  struct WholeMesh {
+    const InterfaceMesh* mesh = nullptr;
+    std::int64_t granules = 0;
+  };
+  using WholeMeshes = std::map<BodyGroups::Key, WholeMesh>;
+  using Parts = std::map<BodyGroups::Key, InterfaceMesh>;
+
+  void expect(const char* keyword, const std::string& pattern);
+  /// Writes one file by `write(name, time)` and notes it in the list of those of its pattern.
+  template <class Write>
+  void write_one(const char* keyword, const std::string& pattern, Write write);
+  void write_meshes(const MeshOutput& output, const std::string& file, double time);
+  void write_bed(const BedOutput& output, const std::string& file, double time);
+  BedTable table(const BedOutput& output) const;
+  InterfaceMesh skin_of_atoms() const;
+  WholeMeshes whole_meshes(Parts& parts, bool skin);
   template <class Write>
   void on_root(const char* keyword, Write write);
-  void write_in_parts(const char* keyword, const std::string& file, std::string text, const std::string& begins,
-                      const std::string& ends);
+  void write_in_parts(const char* keyword, const std::string& file, const PolyDataPiece& piece, double time);
 
   Bed& bed_;
   BodyMeshes& meshes_;

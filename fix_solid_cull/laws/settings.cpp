@@ -43,6 +43,12 @@ class Values {
     if (choice == choices.end()) refuse(w, wanted);
     choice->second();
   }
+  /// Takes the next word if it is this one.
+  bool takes(const char* word) {
+    if (at_ >= words_.size() || words_[at_] != word) return false;
+    ++at_;
+    return true;
+  }
   std::string file(const std::vector<std::string>& endings, const char* wanted) {
     const std::string& w = word(wanted);
     for (const std::string& e : endings)
@@ -116,15 +122,42 @@ const std::map<std::string, Reader>& readers() {
        }},
       {"mesh",
        [](Values& v, Settings& s) {
-         const int every = v.whole("a whole number of steps, 1 or more, and a file name", 1);
-         s.meshes.push_back({every, v.file({".vdb", ".stl", ".vtp"}, "a file name that ends with .vdb, .stl or .vtp")});
+         MeshOutput o;
+         o.every = v.whole("a whole number of steps, 1 or more, and a file name", 1);
+         o.file = v.file({".vdb", ".stl", ".vtp"}, "a file name that ends with .vdb, .stl or .vtp");
+         for (;;)
+           if (v.takes("surface"))
+             o.surface = true;
+           else if (v.takes("skin"))
+             o.skin = true;
+           else if (v.takes("least"))
+             o.least = v.whole("a whole number of granules, 1 or more, behind 'least'", 1);
+           else
+             break;
+         s.meshes.push_back(o);
        }},
       {"bed",
        [](Values& v, Settings& s) {
-         const int every = v.whole("a whole number of steps, 1 or more, and a file name", 1);
-         s.beds.push_back({every, v.file({".vtp"}, "a file name that ends with .vtp")});
+         BedOutput o;
+         o.every = v.whole("a whole number of steps, 1 or more, and a file name", 1);
+         o.file = v.file({".vtp"}, "a file name that ends with .vtp");
+         for (;;)
+           if (v.takes("seen"))
+             o.seen = true;
+           else if (v.takes("spin"))
+             o.spin = true;
+           else
+             break;
+         s.beds.push_back(o);
        }},
   };
+  return table;
+}
+
+/// What may stand behind the file of a keyword.
+const std::map<std::string, std::string>& words_behind_a_file() {
+  static const std::map<std::string, std::string> table = {{"mesh", "'surface', 'skin' or 'least K'"},
+                                                           {"bed", "'seen' or 'spin'"}};
   return table;
 }
 
@@ -148,6 +181,7 @@ std::vector<std::string> setting_keywords() {
 Settings parse_settings(const std::vector<std::string>& words) {
   Settings s;
   s.depth = -1;
+  std::string before;
   for (std::size_t at = 0; at < words.size();) {
     const auto reader = readers().find(words[at]);
     if (const auto old = gone().find(words[at]); old != gone().end())
@@ -155,10 +189,13 @@ Settings parse_settings(const std::vector<std::string>& words) {
     if (reader == readers().end()) {
       std::string known;
       for (const std::string& k : setting_keywords()) known += (known.empty() ? "" : ", ") + k;
+      const auto behind = words_behind_a_file().find(before);
+      if (behind != words_behind_a_file().end()) known += "; behind the file of '" + before + "' may stand " + behind->second;
       throw InputError("unknown keyword '" + words[at] + "': choose from " + known);
     }
     Values values(words, at);
     reader->second(values, s);
+    before = words[at];
     at = values.end();
   }
   if (s.depth < 0) s.depth = s.exterior == Exterior::live ? 2.0 : 0.0;

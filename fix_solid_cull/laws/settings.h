@@ -11,10 +11,20 @@ enum class Store { exact, compact, none };
 enum class Restore { exact, refill };
 enum class ReportLength { brief, full };
 
-/// A file every so many steps; a '*' in its name becomes the step.
-struct Output {
+/// Files of the bed, one every so many steps; a '*' in its name becomes the step.
+struct BedOutput {
   int every;
   std::string file;
+  bool seen = false;  ///< of the stored granules only those that can be seen
+  bool spin = false;  ///< with their spins
+};
+/// Files of interface meshes, likewise.
+struct MeshOutput {
+  int every;
+  std::string file;
+  int least = 1;         ///< granules of a body that is drawn
+  bool surface = false;  ///< all bodies in one, under one name
+  bool skin = false;     ///< the same, around exterior granules too
 };
 
 struct Settings {
@@ -34,8 +44,8 @@ struct Settings {
   double balance_threshold = 0;  ///< largest work of a rank over the mean from which cuts move
   ReportLength report = ReportLength::brief;
   bool reasons = false;        ///< per atom, what keeps it awake and what woke it too
-  std::vector<Output> meshes;  ///< interface meshes; the keyword may stand more than once
-  std::vector<Output> beds;    ///< the whole bed; likewise
+  std::vector<MeshOutput> meshes;  ///< the keyword may stand more than once
+  std::vector<BedOutput> beds;     ///< likewise
 };
 
 /// Parses `keyword value ...`. Throws InputError that names keyword and value as typed, and what to do.

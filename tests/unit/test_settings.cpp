@@ -31,6 +31,7 @@ std::string refusal(const std::string& line) {
 
 using Outputs = std::vector<std::pair<int, std::string>>;
 
+template <class Output>
 Outputs listed(const std::vector<Output>& outputs) {
   Outputs list;
   for (const Output& o : outputs) list.emplace_back(o.every, o.file);
@@ -155,7 +156,9 @@ TEST(Settings, the_limits_themselves_are_allowed) {
                            "mesh 1 a.vdb",
                            "mesh 1 a.stl",
                            "mesh 1 a.vtp",
-                           "bed 1 a.vtp"})
+                           "mesh 1 a.vtp least 3 skin",
+                           "bed 1 a.vtp",
+                           "bed 1 a.vtp seen spin calm 3"})
     EXPECT_EQ(refusal(line), "") << line;
 }
 
@@ -163,6 +166,17 @@ TEST(Settings, files_may_be_several_and_keep_the_star_for_the_step) {
   const Settings s = parsed("mesh 5 a.*.stl bed 6 b_*.vtp mesh 7 a.*.vdb bed 8 c.vtp");
   EXPECT_EQ(listed(s.meshes), (Outputs{{5, "a.*.stl"}, {7, "a.*.vdb"}}));
   EXPECT_EQ(listed(s.beds), (Outputs{{6, "b_*.vtp"}, {8, "c.vtp"}}));
+}
+
+TEST(Settings, words_behind_a_file_are_of_that_file_alone) {
+  const Settings s = parsed("bed 1 a.vtp seen bed 2 b.vtp spin bed 3 c.vtp mesh 4 d.vdb least 20 surface mesh 5 e.stl skin");
+  EXPECT_TRUE(s.beds[0].seen && !s.beds[0].spin);
+  EXPECT_TRUE(!s.beds[1].seen && s.beds[1].spin);
+  EXPECT_TRUE(!s.beds[2].seen && !s.beds[2].spin);
+  EXPECT_TRUE(s.meshes[0].surface && !s.meshes[0].skin);
+  EXPECT_EQ(s.meshes[0].least, 20);
+  EXPECT_TRUE(!s.meshes[1].surface && s.meshes[1].skin);
+  EXPECT_EQ(s.meshes[1].least, 1);
 }
 
 // --------------------------------------------------------------------------------------------------------- what is refused
@@ -258,6 +272,8 @@ const Refusal refusals[] = {
     {"mesh 0 a.stl", "keyword 'mesh' has the value '0': give a whole number of steps, 1 or more, and a file name"},
     {"mesh a.stl", "keyword 'mesh' has the value 'a.stl': give a whole number of steps, 1 or more, and a file name"},
     {"mesh", "keyword 'mesh' ends too early: give a whole number of steps, 1 or more, and a file name"},
+    {"mesh 10 a.vtp least", "keyword 'mesh' ends too early: give a whole number of granules, 1 or more, behind 'least'"},
+    {"mesh 10 a.vtp least 0", "keyword 'mesh' has the value '0': give a whole number of granules, 1 or more, behind 'least'"},
     {"mesh 10", "keyword 'mesh' ends too early: give a file name that ends with .vdb, .stl or .vtp"},
     {"mesh 10 a.obj", "keyword 'mesh' has the value 'a.obj': give a file name that ends with .vdb, .stl or .vtp"},
     {"mesh 10 .stl", "keyword 'mesh' has the value '.stl': give a file name that ends with .vdb, .stl or .vtp"},
