@@ -6,7 +6,7 @@ set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 name=${1:-impact}
 if [ ! -f "$here/$name/example.py" ]; then
-  echo "run.sh: no example '$name'; there is: $(cd "$here" && ls -d */ | tr -d / | tr '\n' ' ')" >&2
+  echo "run.sh: no example '$name'; there is: $(cd "$here" && ls */example.py | sed 's,/.*,,' | tr '\n' ' ')" >&2
   exit 2
 fi
 "$here/../scripts/prepare.sh" liggghts-solidcull

@@ -139,7 +139,7 @@ def moments(out, steps, runs):
 FALLING_MASS = examples.Example(
     here=HERE, deck="fall.in", bed="make.in", bed_takes="making the oval of 15,600 granules: about a minute",
     sources=("material.in",), granules=15600, steps=25200, wanted=METRICS, figures=heap, plot=plot, moments=moments, text=text,
-    files_every=1200, vary=("dx", SHIFTS),
+    files_every=400, vary=("dx", SHIFTS),
     few={"frames": 2, "perframe": 200}, few_bed={"granules": 500, "pullsteps": 2000, "dampsteps": 300, "fadesteps": 300, "reststeps": 100},
     few_granules=500, few_steps=400, few_files_every=100)
 
