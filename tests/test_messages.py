@@ -271,6 +271,7 @@ class KeywordRefusals(Case):
         "carve x 4": ("carve", "x", CARVE), "carve 2 0.5": ("carve", "0.5", CARVE), "carve 2": ("carve", None, CARVE),
         "store some": ("store", "some", STORE), "store": ("store", None, STORE),
         "restore new": ("restore", "new", "'exact' or 'refill'"), "restore": ("restore", None, "'exact' or 'refill'"),
+        "reasons all": ("reasons", "all", "'yes' or 'no'"), "reasons": ("reasons", None, "'yes' or 'no'"),
         "report all": ("report", "all", "'short' or 'full'"), "report": ("report", None, "'short' or 'full'"),
         "voxel fine": ("voxel", "fine", VOXEL), "voxel 0.05": ("voxel", "0.05", VOXEL), "voxel": ("voxel", None, VOXEL),
         "mesh x a.stl": ("mesh", "x", FILE), "mesh 10 a.obj": ("mesh", "a.obj", MESH), "mesh 10": ("mesh", None, MESH),
@@ -278,7 +279,7 @@ class KeywordRefusals(Case):
         "balance 0 1.1": ("balance", "0", BALANCE), "balance 50 1": ("balance", "1", BALANCE), "balance 50": ("balance", None, BALANCE),
         "bed 0 a.vtp": ("bed", "0", FILE), "bed 10 a.stl": ("bed", "a.stl", BED), "bed": ("bed", None, FILE),
     }
-    KEYWORDS = "balance, bed, calm, carve, depth, every, exterior, mesh, report, restore, speed, store, tolerance, voxel"
+    KEYWORDS = "balance, bed, calm, carve, depth, every, exterior, mesh, reasons, report, restore, speed, store, tolerance, voxel"
 
     def test_wrong_type_range_and_missing_values(self):
         for words, (keyword, value, wanted) in self.WRONG.items():

@@ -43,7 +43,7 @@ struct Settings {
   int balance_every = 0;         ///< steps between two looks at the work of ranks; 0: cuts between them stay
   double balance_threshold = 0;  ///< largest work of a rank over the mean from which cuts move
   ReportLength report = ReportLength::brief;
-  bool reasons = false;        ///< per atom, what keeps it awake and what woke it too
+  bool reasons = false;            ///< per atom, what keeps it awake and what woke it too
   std::vector<MeshOutput> meshes;  ///< the keyword may stand more than once
   std::vector<BedOutput> beds;     ///< likewise
 };
