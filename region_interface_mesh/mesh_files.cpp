@@ -135,7 +135,8 @@ void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vec
 PolyDataPiece bed_piece(const BedTable& bed, bool wide) {
   const std::size_t n = bed.radius.size();
   const bool whole = bed.position.size() == 3 * n && bed.velocity.size() == 3 * n && bed.id.size() == n && bed.type.size() == n &&
-                     bed.state.size() == n && bed.body.size() == n && (bed.spin.empty() || bed.spin.size() == 3 * n);
+                     bed.state.size() == n && bed.awake.size() == n && bed.woke.size() == n && bed.body.size() == n &&
+                     (bed.spin.empty() || bed.spin.size() == 3 * n);
   if (!whole) throw std::invalid_argument("a bed file: the columns of the bed differ in length");
   std::vector<int> connectivity(n);
   std::iota(connectivity.begin(), connectivity.end(), 0);
@@ -149,6 +150,8 @@ PolyDataPiece bed_piece(const BedTable& bed, bool wide) {
   if (!bed.spin.empty()) piece.add("w", bed.spin, 3);
   piece.add("type", bed.type);
   piece.add("state", bed.state);
+  piece.add("awake", bed.awake);
+  piece.add("woke", bed.woke);
   add_numbers_of_bodies(piece, bed.body, wide);
   piece.begin("Points");
   piece.add("Points", bed.position, 3);

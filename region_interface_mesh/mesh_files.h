@@ -32,11 +32,12 @@ struct BedTable {
   std::vector<float> spin;      // 3 per granule, or none at all
   std::vector<float> radius;
   std::vector<int> id, type, state;
+  std::vector<int> awake, woke;  ///< what keeps a granule awake and what woke it: numbers of fix_solid_cull.md, 0 where it sleeps
   std::vector<std::int64_t> body;  // written as Int32 where that holds all values
 };
 
 /// VTK XML PolyData of points (one vertex cell each) with point arrays id, radius, pscale (the same), v, w (the spin, if there is
-/// one), type, state, body. time: s. Local.
+/// one), type, state, awake, woke, body. time: s. Local.
 void write_bed_vtp(const std::string& file, const BedTable& bed, double time);
 /// The same as one piece of several; wide: bodies are numbered alike in all of them. Local.
 PolyDataPiece bed_piece(const BedTable& bed, bool wide);

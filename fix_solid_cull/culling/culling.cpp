@@ -239,9 +239,9 @@ void Culling::collect_wakes() {
 /// Whether any does.
 Label Culling::label_with_reasons(int i) const {
   const double body = bed_.shell.labels()[i];
-  const AtRest& r = p_.survey[i];
-  if (bed_.shell.locked(i) || body != 0) return {body, 0, 0};
-  return {0, 1.0 + static_cast<int>(r.awake), static_cast<double>(r.woke_by)};
+  if (body != 0) return {body, 0, 0};  // of what is shown between runs, too
+  const Survey::Reasons why = p_.survey.reasons(i);
+  return {0, static_cast<double>(why.awake), static_cast<double>(why.woke)};
 }
 
 bool Culling::ask_for_those_that_wake() {

@@ -29,7 +29,7 @@ CullingParts::CullingParts(const Ports& engine, const Settings& settings, int ty
       report(bed, motion, meter),
       run_end(bed, meter, report, balance),
       forecaster(bed, meter, report),
-      files(bed, meshes, report),
+      files(bed, meshes, survey, report),
       invariants(bed),
       followers{&bed.shell, &walls.rows(), &survey.rows(), &cover.rows(), &closure.rows(), &shown, &bed.locked_clumps} {
   for (BodyFollower* f : std::initializer_list<BodyFollower*>{&motion, &closure, &handover, &cover, &meshes})

@@ -182,7 +182,7 @@ BedTable OutputFiles::table(const BedOutput& output) const {
   struct Row {
     std::array<float, 3> x, v, w;
     float radius;
-    int id, type, state;
+    int id, type, state, awake, woke;
     BodyGroups::Key body;
   };
   const auto narrow = [](const Vec3& a) {
@@ -195,8 +195,10 @@ BedTable OutputFiles::table(const BedOutput& output) const {
     const GranuleState state = !e.locked      ? GranuleState::exterior
                                : e.excess > 1 ? GranuleState::waking
                                               : GranuleState::interface_;
+    const Survey::Reasons why = survey_.reasons(i);
     rows.push_back({narrow(atoms.place(i)), narrow(atoms.velocity(i)), narrow(atoms.spin(i)), static_cast<float>(atoms.radius[i]),
-                    atoms.tag[i], atoms.type[i], static_cast<int>(state), static_cast<BodyGroups::Key>(bed_.shell.labels()[i])});
+                    atoms.tag[i], atoms.type[i], static_cast<int>(state), why.awake, why.woke,
+                    static_cast<BodyGroups::Key>(bed_.shell.labels()[i])});
   }
   std::optional<SeenGranules> seen;
   if (output.seen) seen.emplace(bed_);
@@ -205,7 +207,7 @@ BedTable OutputFiles::table(const BedOutput& output) const {
     if (seen && !seen->sees(x)) return;
     const Twist& motion = bed_.solid.bodies().body(g.body).twist;
     rows.push_back({narrow(x), narrow(motion.at(bed_.solid.in_world(g))), narrow(motion.spin), static_cast<float>(g.radius),
-                    static_cast<int>(g.tag), bed_.solid.store().get(g.tag).type, static_cast<int>(GranuleState::interior),
+                    static_cast<int>(g.tag), bed_.solid.store().get(g.tag).type, static_cast<int>(GranuleState::interior), 0, 0,
                     bed_.groups.key_of(g.body)});
   });
   std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.id < b.id; });
@@ -229,6 +231,8 @@ BedTable OutputFiles::table(const BedOutput& output) const {
   column(bed.id, [](const Row& r) { return r.id; });
   column(bed.type, [](const Row& r) { return r.type; });
   column(bed.state, [](const Row& r) { return r.state; });
+  column(bed.awake, [](const Row& r) { return r.awake; });
+  column(bed.woke, [](const Row& r) { return r.woke; });
   column(bed.body, [](const Row& r) { return r.body; });
   return bed;
 }

@@ -10,13 +10,15 @@
 #include "body_meshes.h"
 #include "mesh_files.h"
 #include "report.h"
+#include "survey.h"
 
 namespace solidcull {
 
 /// Files are written whole or not at all; one that cannot be written is an InputError on all ranks.
 class OutputFiles {
  public:
-  OutputFiles(Bed& bed, BodyMeshes& meshes, Report& report) : bed_(bed), meshes_(meshes), report_(report) {}
+  OutputFiles(Bed& bed, BodyMeshes& meshes, const Survey& survey, Report& report)
+      : bed_(bed), meshes_(meshes), survey_(survey), report_(report) {}
 
   /// A run begins: files can be written where they are to be. Collective.
   void begin_run();
@@ -48,6 +50,7 @@ class OutputFiles {
 
   Bed& bed_;
   BodyMeshes& meshes_;
+  const Survey& survey_;
   Report& report_;
   std::int64_t written_at_ = -1;  // a step of the deck
   std::set<std::string> said_;    // of files that are written over

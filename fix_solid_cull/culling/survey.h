@@ -74,6 +74,13 @@ class Survey {
 
   const AtRest& operator[](int i) const { return rows_[i]; }
   PerGranule<AtRest>& rows() { return rows_; }
+  struct Reasons {
+    int awake, woke;  ///< numbers of fix_solid_cull.md; 0 of an interface granule
+  };
+  Reasons reasons(int i) const {
+    if (bed_.shell.locked(i)) return {0, 0};
+    return {1 + static_cast<int>(rows_[i].awake), static_cast<int>(rows_[i].woke_by)};
+  }
   bool stands_at_wall(int i) const { return walls_[i].stands; }
   /// Owned granule i is free again.
   void note_wake(int i, Woke by) {

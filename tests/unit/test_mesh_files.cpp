@@ -99,6 +99,8 @@ BedTable bed_of(int n) {
     bed.id.push_back(100 + i);
     bed.type.push_back(1 + i % 3);
     bed.state.push_back(i % 4);
+    bed.awake.push_back(i % 9);
+    bed.woke.push_back(i % 5);
     bed.body.push_back(i / 7);
   }
   return bed;
@@ -152,6 +154,8 @@ TEST_F(MeshFiles, bed_vtp_holds_every_column) {
     EXPECT_EQ(array_of<int>(xml, "id", "Int32"), bed.id);
     EXPECT_EQ(array_of<int>(xml, "type", "Int32"), bed.type);
     EXPECT_EQ(array_of<int>(xml, "state", "Int32"), bed.state);
+    EXPECT_EQ(array_of<int>(xml, "awake", "Int32"), bed.awake);
+    EXPECT_EQ(array_of<int>(xml, "woke", "Int32"), bed.woke);
     EXPECT_EQ(array_of<int>(xml, "body", "Int32"), std::vector<int>(bed.body.begin(), bed.body.end()));
     EXPECT_EQ(array_of<int>(xml, "offsets", "Int32").size(), static_cast<std::size_t>(n));
     EXPECT_THROW(array_of<float>(xml, "w", "Float32"), std::runtime_error) << "nobody asked for spins";
