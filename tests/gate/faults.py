@@ -27,9 +27,9 @@ from solidcull_runs.errors import RunError, command  # noqa: E402
 
 PATCHES = HERE / "faults"
 QUICK = "-O1"  # for a fault's file: takes less time to compile, and is itself another rounding
-FLAGS = {"O1": "-O1", "native": "-O3 -march=native -ffp-contract=fast", "O2": "-O2 -fno-tree-vectorize",
-         "order": "-O2 -fassociative-math -fno-signed-zeros -fno-trapping-math"}
-PHYSICS = ("fix_solid_cull/laws/", "fix_solid_cull/solid/", "fix_solid_cull/culling/")  # what --flags compiles anew
+FLAGS = {"native": "-O3 -march=native -ffp-contract=fast", "order": "-O2 -fassociative-math -fno-signed-zeros -fno-trapping-math",
+         "O1": "-O1"}
+PHYSICS = ("fix_solid_cull/laws/", "fix_solid_cull/solid/")  # what --flags compiles anew: bodies, their sums, frozen loads, laws
 
 
 class Fault:
