@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = ("README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md", "tests/golden/README.md", "tests/fuzz/README.md", "fix_solid_cull/**/*.md", "region_interface_mesh/*.md", "benchmarks/README.md", "examples/**/*.md",
+PAGES = ("README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md", "tests/golden/README.md", "tests/fuzz/README.md", "tests/gate/README.md", "fix_solid_cull/**/*.md", "region_interface_mesh/*.md", "benchmarks/README.md", "examples/**/*.md",
          "validation/**/*.md")
 MADE = {"out", "build", "report"}  # folders of what runs leave
 MOST_WORDS = 25
