@@ -15,10 +15,13 @@ if [ "${1:-}" = --changed ]; then
     exit 77
   fi
   differ=$(git diff --name-only --diff-filter=d "$base" -- $folders)
-  # a header is read with its .cpp where that differs too
+  # a header is read with its .cpp, or with one beside it that includes it: alone it would have the flags of any file
   mapfile -t files < <(sed -nE '/\.(cpp|h)$/p' <<<"$differ" | while read -r f; do
-    [[ $f == *.h ]] && grep -qxF "${f%.h}.cpp" <<<"$differ" || echo "$f"
-  done)
+    if [[ $f != *.h ]]; then echo "$f"
+    elif [ -e "${f%.h}.cpp" ]; then echo "${f%.h}.cpp"
+    else { grep -lF "\"$(basename "$f")\"" "$(dirname "$f")"/*.cpp || echo "$f"; } 2>/dev/null | sed -n 1p
+    fi
+  done | sort -u)
   [ ${#files[@]} -gt 0 ] || { echo "tidy: nothing has changed since $(git describe --always "$base")"; exit 0; }
 elif [ $# -eq 0 ]; then
   mapfile -t files < <(find $folders -name '*.cpp' | sort)
@@ -26,6 +29,6 @@ fi
 
 SOLIDCULL_PACKAGES="clang-tidy libbenchmark-dev" SOLIDCULL_BUILD=$root/build-tidy SOLIDCULL_CMAKE="-DSOLIDCULL_BENCHMARKS=ON -DCMAKE_UNITY_BUILD=OFF" \
   scripts/prepare.sh --configure
-# a header alone is read with the flags of a file beside it
+# a header that none beside it includes has the flags of a file beside it
 printf '%s\0' "${files[@]}" | xargs -0 -n 1 -P "${SOLIDCULL_JOBS:-$(nproc)}" clang-tidy -p build-tidy --quiet
 echo "tidy: ${#files[@]} files, nothing found"

@@ -136,7 +136,7 @@ class Survey {
     rows_[i].awake = Awake::count;
   }
   std::vector<Vec3> accelerations() const;
-  void accelerate_clumps(std::vector<Vec3>& of_atoms) const;
+  void accelerate_clumps(std::vector<Vec3>& a) const;
   void see_clumps(Seen& seen) const;
   void unite_calm();
   Seen see_contacts(const SolidStateLaw& law) const;

@@ -24,6 +24,6 @@ std::string text_of(const RunSummary& run, const Settings& settings);
 std::string text_of(const Forecast& f, const RunWork& lately, const Settings& settings);
 
 /// What would let more sleep, in words; empty where the counts do not show it.
-std::string advice_on(const RunWork& run, const Settings& settings);
+std::string advice_on(const RunWork& w, const Settings& settings);
 
 }  // namespace solidcull

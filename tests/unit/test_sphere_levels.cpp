@@ -91,7 +91,7 @@ TEST(SphereLevels, places_that_are_no_numbers_lead_nowhere) {
   for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL})
     for (const int of : {0, 7}) {
       LevelCloud cloud(20, 1, 1, 1, 0.1, 0.2, 5);
-      cloud.coordinates[static_cast<std::size_t>(3 * of + 1)] = bad;
+      cloud.coordinates[3 * static_cast<std::size_t>(of) + 1] = bad;
       SphereLevels levels;
       levels.build(cloud.size(), cloud.centres.data(), cloud.radii.data(), 1, 0.01);
       int found = 0;
