@@ -8,7 +8,8 @@ namespace solidcull {
 
 void Forecaster::begin_run() {
   first_step_ = bed_.run.step;
-  waits_ = report_.told_forecast().times_less == 0;
+  waits_ = true;
+  report_.set_forecast({});
   marked_ = false;
   times_ = {static_cast<double>(bed_.run.steps_left), static_cast<double>(bed_.scales.look_every())};
 }

@@ -1,4 +1,4 @@
-// Tells once, from what the first looks of a run have seen, what the line will gain.
+// Tells once in each run, from what its first looks have seen, what the line will gain.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ class Forecaster {
   Report& report_;
   ForecastTimes times_;
   std::int64_t first_step_ = 0;
-  bool waits_ = false;  // this run is to tell: none has
+  bool waits_ = false;  // this run is to tell
   bool marked_ = false;
   RunWork at_mark_;
 };

@@ -28,7 +28,6 @@ class Report {
 
   /// What f_ID says of it from now on; before, nothing is known. Alike on all ranks.
   void set_forecast(const Forecast& f) { forecast_ = f; }
-  const Forecast& told_forecast() const { return forecast_; }
 
   /// f_ID[n + 1]. Collective.
   double value(int n);

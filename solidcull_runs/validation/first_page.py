@@ -54,13 +54,8 @@ def named(figure):
     """A figure and how far it is off; where pairs were added until that was decided, within what it is equal or by how much it differs."""
     if "pairs" not in figure:
         return f"{figure['figure']} {percent(figure['percent'])}"
-    if figure["unit"] != "%":
-        return f"{figure['figure']} {kept_figures.told(figure).rpartition(': ')[2]}"
-    if figure["verdict"] == verdicts.OTHER:
-        return f"{figure['figure']} differs by {percent(abs(figure['by']))}"
-    if figure["verdict"] == verdicts.SAME:
-        return f"{figure['figure']} equal within {percent(max(abs(figure['low']), abs(figure['high'])))}"
-    return f"{figure['figure']} {figure['low']:+.2g} to {figure['high']:+.2g} %"
+    told = kept_figures.told(figure, percent if figure["unit"] == "%" else None)
+    return f"{figure['figure']} {told.rpartition(': ')[2]}"
 
 
 def is_beyond(figure):

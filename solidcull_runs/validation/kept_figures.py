@@ -45,15 +45,16 @@ def figure_off(metric, verdict, unculled):
     return figure
 
 
-def told(figure):
+def told(figure, show=None):
     """The verdict on a figure, in words. With pairs that were added until it was decided: within what the runs are equal, or by how
-    much they differ; in per cent of the unculled mean, or in the figure's unit where its margin is."""
+    much they differ; in per cent of the unculled mean, or in the figure's unit where its margin is. `show`: such a number as text."""
+    show = show or (lambda number: f"{number:.2g} {figure['unit']}")
     if "pairs" not in figure:
         return figure["verdict"]
     if figure["verdict"] == verdicts.SAME:
-        return f"equal within {max(abs(figure['low']), abs(figure['high'])):.2g} {figure['unit']}"
+        return f"equal within {show(max(abs(figure['low']), abs(figure['high'])))}"
     if figure["verdict"] == verdicts.OTHER:
-        return f"differs by {abs(figure['by']):.2g} {figure['unit']}"
+        return f"differs by {show(abs(figure['by']))}"
     return f"not decided after {figure['pairs']} pairs: {figure['low']:+.2g} to {figure['high']:+.2g} {figure['unit']}"
 
 

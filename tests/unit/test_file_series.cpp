@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -7,6 +6,7 @@
 #include <stdexcept>
 
 #include "file_series.h"
+#include "temporary_folder.h"
 
 namespace solidcull {
 namespace {
@@ -15,14 +15,7 @@ namespace fs = std::filesystem;
 
 class AFileSeries : public ::testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = fs::temp_directory_path() / "solidcull-file-series-XXXXXX";
-    ASSERT_TRUE(::mkdtemp(name.data()));
-    folder = name;
-  }
-  void TearDown() override { fs::remove_all(folder); }
-
-  std::string path(const std::string& name) const { return (folder / name).string(); }
+  std::string path(const std::string& name) const { return folder / name; }
   /// Writes the file of a step, as the fix does, and notes it.
   static void write(const FileSeries& series, std::int64_t step, double time) {
     std::ofstream(series.file(step)) << "x";
@@ -35,7 +28,7 @@ class AFileSeries : public ::testing::Test {
     return all.str();
   }
 
-  fs::path folder;
+  TemporaryFolder folder;
 };
 
 TEST_F(AFileSeries, numbers_sort_as_steps_do) {
@@ -51,7 +44,7 @@ TEST_F(AFileSeries, one_file_has_its_own_name_and_no_list) {
   EXPECT_FALSE(series.numbered());
   write(series, 400, 0.1);
   EXPECT_TRUE(fs::exists(path("bed.vtp")));
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), 1);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
 }
 
 TEST_F(AFileSeries, the_list_is_named_as_its_files) {

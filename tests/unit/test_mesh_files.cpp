@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 #include <zlib.h>
 
 #include <cstring>
@@ -10,6 +9,7 @@
 
 #include "mesh_files.h"
 #include "mesh_of.h"
+#include "temporary_folder.h"
 
 namespace solidcull {
 namespace {
@@ -18,14 +18,7 @@ namespace fs = std::filesystem;
 
 class MeshFiles : public ::testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = fs::temp_directory_path() / "solidcull-mesh-files-XXXXXX";
-    ASSERT_TRUE(::mkdtemp(name.data()));
-    folder = name;
-  }
-  void TearDown() override { fs::remove_all(folder); }
-
-  std::string path(const std::string& name) const { return (folder / name).string(); }
+  std::string path(const std::string& name) const { return folder / name; }
   static std::string content(const std::string& file) {
     std::ifstream in(file, std::ios::binary);
     std::ostringstream all;
@@ -33,12 +26,12 @@ class MeshFiles : public ::testing::Test {
     return all.str();
   }
   bool nothing_left_over() const {
-    for (const auto& entry : fs::directory_iterator(folder))
+    for (const auto& entry : fs::directory_iterator(folder.path()))
       if (entry.path().extension() == ".part") return false;
     return true;
   }
 
-  fs::path folder;
+  TemporaryFolder folder;
 };
 
 TriangleMesh tetrahedron() {

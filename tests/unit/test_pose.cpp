@@ -3,12 +3,10 @@
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <limits>
 #include <random>
 #include <sstream>
@@ -17,6 +15,7 @@
 #include "mesh_files.h"
 #include "mesh_of.h"
 #include "pose.h"
+#include "temporary_folder.h"
 
 namespace solidcull {
 namespace {
@@ -384,10 +383,8 @@ TEST(InterfaceMeshInFlight, a_merge_after_a_merge_stays_where_it_is) {
 // ------------------------------------------------------------------------------------------------------------------- files
 
 TEST(InterfaceMeshInFlight, a_vdb_file_shows_it_where_it_is) {
-  std::string name = std::filesystem::temp_directory_path() / "solidcull-pose-XXXXXX";
-  ASSERT_TRUE(::mkdtemp(name.data()));
-  const std::filesystem::path folder = name;
-  const std::string file = (folder / "m.vdb").string();
+  const TemporaryFolder folder;
+  const std::string file = folder / "m.vdb";
   const InterfaceMesh still = bitten(), moved = bitten(flown);
   write_vdb(file, {&still, &moved}, {"still", "moved"});
   openvdb::io::File in(file);
@@ -409,7 +406,6 @@ TEST(InterfaceMeshInFlight, a_vdb_file_shows_it_where_it_is) {
     EXPECT_GT(inside, 200) << title;
   }
   in.close();
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

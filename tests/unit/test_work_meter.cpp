@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "world_parts.h"
 
 namespace solidcull {
@@ -122,6 +125,77 @@ TEST(RunEnd, says_one_block_and_all_counters_if_asked_for) {
     EXPECT_EQ(parts.report.value(30), 1);
     EXPECT_EQ(parts.report.value(33), 0);
   }
+}
+
+/// Half of 1,200 granules are culled; the engine has spent a quarter of a run's time on pairs.
+struct ForecastRun {
+  ForecastRun() : world(empty_space()), parts(world, sleeping_settings(), 2 * r) {
+    for (int n = 0; n < 1200; ++n) world.add(1 + n, Vec3(0.999 * 2 * r * (n % 30), 4 * r * (n / 30), 0), r);
+    world.reneighbour();
+    world.compute_forces();
+    world.run.pair_forces = 0.25;
+  }
+  void cull() {
+    std::vector<std::int64_t> tags;
+    for (int tag = 601; tag <= 1200; ++tag) tags.push_back(tag);
+    parts.lock(tags);
+    parts.reneighbour();
+    parts.bed.census.count_bodies();
+    parts.meter.note_new_lists();
+  }
+  void begin(int steps) {
+    world.run.steps_left = steps;
+    parts.meter.begin_run(0);
+    parts.forecaster.begin_run();
+  }
+  /// Steps with a look at their end.
+  void look_after(int steps) {
+    for (int n = 0; n < steps; ++n) parts.meter.count_step(0);
+    world.run.step += steps;
+    world.run.steps_left -= steps;
+    parts.forecaster.see_look();
+  }
+  /// To where a forecast is due, slowly enough for one.
+  void to_the_forecast(int looks) {
+    for (int n = 0; n < looks; ++n) {
+      look_after(parts.bed.scales.look_every());
+      if (n == looks - 2) std::this_thread::sleep_for(std::chrono::milliseconds(600));
+      world.run.pair_forces += 0.25 / looks;
+    }
+  }
+  double forecast() { return parts.report.value(34); }
+  SmallWorld world;
+  WorldParts parts;
+};
+
+TEST(Forecaster, says_in_each_run_what_it_will_gain) {
+  ForecastRun r;
+  r.cull();
+  for (const std::size_t told : {1u, 2u}) {
+    r.begin(200 * r.parts.bed.scales.look_every());
+    EXPECT_EQ(r.forecast(), 0);
+    r.to_the_forecast(60);
+    ASSERT_EQ(r.world.run.said.size(), told - 1) << "three tenths of the run have not passed since the first look";
+    r.to_the_forecast(2);
+    ASSERT_EQ(r.world.run.said.size(), told);
+    EXPECT_EQ(r.world.run.said.back().find("if it goes on like this, the run will be about "), 0u) << r.world.run.said.back();
+    EXPECT_GT(r.forecast(), 0);
+    EXPECT_NEAR(r.parts.report.value(35), 0.5, 1e-12) << "of the granules is exterior";
+    r.to_the_forecast(5);
+    EXPECT_EQ(r.world.run.said.size(), told) << "once in a run";
+    r.parts.meter.end_run(0);
+  }
+}
+
+TEST(Forecaster, says_nothing_where_nothing_is_culled_or_only_late_in_a_run) {
+  ForecastRun r;
+  r.begin(200 * r.parts.bed.scales.look_every());
+  r.to_the_forecast(80);
+  EXPECT_TRUE(r.world.run.said.empty());
+  r.cull();
+  r.to_the_forecast(70);  // due when more than six tenths are over
+  EXPECT_TRUE(r.world.run.said.empty());
+  EXPECT_EQ(r.forecast(), 0);
 }
 
 }  // namespace
