@@ -69,6 +69,27 @@ def loop_time(tables):
     return sum(t.loop_time or 0 for t in tables if t.counted)
 
 
+FORECAST = re.compile(r"if it goes on like this, the run will be about (?:([\d.e+]+) times (less|more)|as much) work")
+TOLD = re.compile(r"time          = .*: about (?:([\d.e+]+) times (less|more)|as much) work")
+
+
+def times_less(found):
+    """How many times less work, of a match of FORECAST or TOLD; 1 where it is as much."""
+    return None if not found else 1.0 if not found[1] else float(found[1]) if found[2] == "less" else 1 / float(found[1])
+
+
+def loops(text):
+    """The runs of a deck behind its solid/cull line: seconds of the loop, and how many times less work the fix forecast of it and told at
+    its end, None where it did not."""
+    found, begun = [], 0
+    behind = text.partition(f"\n{FROM_HERE}\n")[2].partition(f"\n{TO_HERE}\n")[0]
+    for loop in re.finditer(r"(?m)^Loop time of ([\d.e+-]+) .*$", behind):
+        of_loop = behind[begun:loop.end()]
+        begun = loop.end()
+        found.append({"seconds": float(loop[1]), "forecast": times_less(FORECAST.search(of_loop)), "told": times_less(TOLD.search(of_loop))})
+    return found
+
+
 def inserted(text):
     """How many granules the insertion fixes of a deck put in behind its solid/cull line."""
     before, _, behind = text.partition(f"\n{FROM_HERE}\n")

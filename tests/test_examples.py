@@ -286,6 +286,20 @@ class Validation(Scripts):
         self.assertEqual(keywords, {"unculled-1": "# fix cull all solid/cull", "varied-1": "fix cull all solid/cull tolerance 3 0 speed 0.01",
                                     "halved-1": "fix cull all solid/cull tolerance 1.5 0 speed 0.005"})
 
+    def test_audit(self):
+        """Each place of an audit is come to in the same way, with and without all that sleeps awake."""
+        few = ROOT / "validation" / "audit" / "out" / "few" / "blade_drag"
+        shutil.rmtree(few, ignore_errors=True)
+        self.run_script(ROOT / "validation" / "audit" / "audit.py")
+        places = sorted(f.stem[5:] for f in few.glob("then-*.dump"))
+        self.assertEqual(places, [f"{run}-{at}" for run in range(3) for at in (40, 80, 120)])
+        for place in places:
+            then, left, awake = (dumps.read_final(few / f"{kind}-{place}.dump") for kind in ("then", "left", "awake"))
+            for granules in (left, awake):
+                self.assertEqual(then["id"].tolist(), granules["id"].tolist())
+        log, = few.glob("*audited*.log")
+        self.assertIn("audit         = ", log.read_text())
+
     def test_chain(self):
         few = ROOT / "validation" / "chain" / "out" / "few"
         (few / "chain.json").unlink(missing_ok=True)

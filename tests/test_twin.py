@@ -754,7 +754,8 @@ class Drivers(unittest.TestCase):
     DRIVERS = ("examples/impact/example.py", "examples/drum/example.py", "examples/falling_mass/example.py", "examples/plate_discharge/example.py",
                "validation/motion/motion.py", "validation/scale/scale.py", "validation/scale/choices.py", "validation/scale/weight.py", "validation/scale/tools.py",
                "validation/activity/activity.py", "validation/stress/stress.py", "validation/no_harm/no_harm.py",
-               "validation/chain/chain.py", "validation/ladder/ladder.py", "validation/halving/halving.py")
+               "validation/chain/chain.py", "validation/ladder/ladder.py", "validation/halving/halving.py",
+               "validation/audit/audit.py")
 
     def test_no_launcher(self):
         for driver in self.DRIVERS:

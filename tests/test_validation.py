@@ -178,6 +178,21 @@ class Ledger(unittest.TestCase):
         given = (points.SLEEP, 0, range(10)), (points.PAPER, 0, range(6))
         self.assertEqual((self.lost(*given), self.lost(*given, refilled=True)), (0, 4))
 
+    def test_the_log_says_what_was_forecast_and_what_came(self):
+        forecast = "fix cull solid/cull: if it goes on like this, the run will be about {} work than without it: 21 % of the granules are exterior"
+        told = "  time          = 12.7 s, of it 4.31 s in the fix: about {} work than without it"
+        loop = "Loop time of {} on 1 procs for 400 steps with 100 atoms, finish time"
+        lines = [forecast.format("9 times less"), loop.format(7), logs.FROM_HERE, "  time          = 0.2 s, of it 0.1 s in the fix", loop.format(0.2),
+                 forecast.format("2.6 times less"), told.format("2.4 times less"), loop.format(12.7),
+                 "fix cull solid/cull: if it goes on like this, the run will be about as much work as without it: 90 % of", told.format("1.2 times more"),
+                 loop.format("3e+02"), logs.TO_HERE, forecast.format("7 times less"), loop.format(5)]
+        first, second, third = logs.loops("\n".join(lines) + "\n")
+        self.assertEqual(first, {"seconds": 0.2, "forecast": None, "told": None})
+        self.assertEqual(second, {"seconds": 12.7, "forecast": 2.6, "told": 2.4})
+        self.assertEqual((third["seconds"], third["forecast"]), (300, 1))
+        self.assertAlmostEqual(third["told"], 1 / 1.2)
+        self.assertEqual(logs.loops("no line\n"), [])
+
     def test_the_log_says_what_was_put_in(self):
         line = "INFO: Particle insertion {}: inserted 2 particle templates (mass 1) at step 9\n - a total of {} particle templates (mass 2) inserted so far.\n"
         text = line.format("fill", 100) + f"{logs.FROM_HERE}\n" + line.format("fill", 103) + line.format("feed", 7) + line.format("feed", 9)
@@ -303,6 +318,63 @@ class Sequential(unittest.TestCase):
         missing = {k: x for k, x in culled.items() if k != 1}
         self.assertEqual(verdicts.in_looks(unculled, {k: missing[k] for k in sorted(missing)[:4]}, lambda mean: 2.0).pairs, 4, "a run that failed")
         self.assertRaises(ValueError, verdicts.in_looks, {0: 1.0, 1: 2.0}, {1: 1.0}, abs)
+
+
+class Audit(unittest.TestCase):
+    """What is kept of validation/audit, likewise; and the truth, of granules that are put in by hand."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = ROOT / "validation" / "audit"
+        spec = importlib.util.spec_from_file_location("validation_audit", cls.folder / "audit.py")
+        cls.script = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(cls.script)
+        cls.records = json.loads((cls.folder / "results.json").read_text())
+
+    def test_the_page_is_made_of_the_values(self):
+        text = (self.folder / "RESULTS.md").read_text()
+        self.assertEqual(pages.between_marks(self.folder / "RESULTS.md", self.script.BEGIN, self.script.text_of(self.records)), text)
+
+    def test_what_is_missed_is_held(self):
+        """In at least four scenes that it was not made for."""
+        found = self.script.compared(self.records, self.script.HELD_OUT)
+        self.assertGreaterEqual(len({c.record["scene"] for c in found}), 4)
+        self.assertGreaterEqual(len(found), 12)
+        self.assertGreaterEqual(sum(c.held for c in found), self.script.LEAST_HELD * len(found))
+        self.assertLess(statistics.median(c.width for c in found), self.script.WIDEST)
+
+    def test_what_is_missed_is_not_always_held(self):
+        """The comparison can fail."""
+        record = {"scene": "impact", "figure": "load", "patches": 9, "steps": 96, "missed": [0.05, 0.051, 0.049], "low": 0.001, "high": 0.01}
+        c = self.script.Compared(record)
+        self.assertTrue(c.resolved)
+        self.assertFalse(c.held)
+        self.assertTrue(self.script.Compared(record | {"high": 0.06}).held)
+        self.assertTrue(self.script.Compared(record | {"missed": [0.05, -0.05, 0.01]}).held, "nothing is known to be missed")
+
+    def granules(self, asleep, places):
+        kinds = [(c, float) for c in ("id", "mass", "radius", "x", "y", "z", "vx", "vy", "vz", "f_cull")]
+        return np.array([(n + 1, 2.0, 0.5, x, 0, 0, 0, 0, 0, float(asleep[n])) for n, x in enumerate(places)], kinds)
+
+    def test_the_truth_is_what_a_woken_bed_does_more(self):
+        """A row of six that touch, the last one awake; what is near it counts more."""
+        asleep, places = [1, 1, 1, 1, 1, 0], np.arange(6) * 0.99
+        then = self.granules(asleep, places)
+        left, woken = then.copy(), then.copy()
+        woken["x"][4] += 0.006
+        woken["vx"][4] = 0.1
+        told = self.script.missing(then, left, woken)
+        within = 4  # of five sleepers, those nearer than 3.5 diameters to the only one beside what is awake
+        self.assertAlmostEqual(told["displacement"], 0.006 / within)
+        self.assertAlmostEqual(told["kinetic energy"], 0.5 * 2.0 * 0.1**2 / within)
+        force = 0.5 * 0.01**1.5  # but for the modulus
+        # the contact with the one before it opens from an overlap of 0.01 to 0.004; 2, 3 and 4 are deep, and pressed from both sides
+        self.assertAlmostEqual(told["load"], (force - 0.5 * 0.004**1.5) / (3 * 2 * force))
+        left["x"][4] += 0.006
+        left["vx"][4] = 0.1
+        for figure, missed in self.script.missing(then, left, woken).items():
+            self.assertAlmostEqual(missed, 0, msg=figure)
+        self.assertIsNone(self.script.missing(self.granules([0] * 6, places), left, woken), "nothing sleeps")
 
 
 class Halving(unittest.TestCase):
@@ -621,6 +693,26 @@ class Command(Folder):
     def test_no_results(self):
         status, said = self.validate("true", "--report-only", "slow_impact")
         self.assertEqual((status, said), (2, ["validate: no case has results to report"]))
+
+    def test_results_that_were_kept_are_reported(self):
+        kept = self.folder / "kept"
+        (kept / "full").mkdir(parents=True)
+        shutil.copy(STORED, kept / "full" / "slow_impact.json")
+        status, said = self.validate("true", "--full", "--report-only", "--kept", str(kept))
+        self.assertEqual((status, said), (0, []))
+        self.assertIn("[slow_impact](", (self.folder / "report" / "README.md").read_text())
+        (kept / "full" / "slow_impact.json").write_text("{}")
+        status, said = self.validate("true", "--full", "--report-only", "--kept", str(kept))
+        self.assertEqual((status, len(said)), (2, 1))
+        self.assertIn("is not the result of a case", said[0])
+
+    def test_results_are_kept_beside_the_runs(self):
+        case = types.SimpleNamespace(name="c", title="", claim="", reference="", size="quick", metrics=[], scenes={}, main_scene=None, get=lambda *_: None)
+        files = [self.folder / "out" / "c" / "results.json", self.folder / "kept" / "c.json"]
+        course = case_runs.Course([], 1, lambda line: None)
+        self.assertEqual(command.run_case(case, [], course, files, self.folder / "out"), [])
+        self.assertEqual(files[0].read_text(), files[1].read_text())
+        self.assertEqual(json.loads(files[1].read_text())["case"], "c")
 
     def test_an_unknown_case(self):
         status, said = self.validate("true", "crater")

@@ -116,7 +116,9 @@ void Change::make(Look& look, Phase phase) {
   }
   if (phase == Phase::stepping) bed_.memory.make_room(look.chosen().chosen.size());
   p_.refill.begin_change();
-  MembershipChange c(bed_, p_.for_change(), bed_.take_wakes(now.wakes_all), look.take());
+  Wakes wakes = bed_.take_wakes(now.wakes_all);
+  p_.audit.see_wakes(wakes);
+  MembershipChange c(bed_, p_.for_change(), std::move(wakes), look.take());
   const bool changes = now.changes() || overlaps;
   bool shell_changed = false;
   p_.grounding.let_go();

@@ -140,6 +140,7 @@ void Culling::initial_step() {
   if (!first || !bed_.solid.has_store()) return;
   p_.meter.begin_run(p_.report.seconds());
   p_.forecaster.begin_run();
+  p_.audit.begin_run();
   take_loads();
   p_.gravity.begin_run();
   look_.see_walls(true);
@@ -203,6 +204,7 @@ void Culling::take_forces() {
   p_.meter.count_step(p_.report.seconds());
   if (bed_.census.something_locked() || !loads_are_none_) take_loads();
   loads_are_none_ = !bed_.census.something_locked();
+  p_.audit.see_forces();
   collect_wakes();
   if (p_.pacing.due(step)) {
     look_.look();

@@ -32,12 +32,15 @@ class Culling {
   void end_setup();     ///< forces are there, but for what other fixes add later
 
   // --- a time step
-  void initial_step();                                     ///< takes the loads of a run's setup
-  void integrate();                                        ///< bodies move, and carry their interface granules
-  void change() { change_.make(look_, phase_); }           ///< membership: only place where atoms come and go
-  void take_neighbours();                                  ///< after the engine's exchange, when ghosts are there
-  void note_new_lists() { p_.freezing.note_new_lists(); }  ///< local
-  void leave_out_inner_pairs() {                           ///< local
+  void initial_step();                            ///< takes the loads of a run's setup
+  void integrate();                               ///< bodies move, and carry their interface granules
+  void change() { change_.make(look_, phase_); }  ///< membership: only place where atoms come and go
+  void take_neighbours();                         ///< after the engine's exchange, when ghosts are there
+  void note_new_lists() {                         ///< local
+    p_.freezing.note_new_lists();
+    p_.audit.note_new_lists();
+  }
+  void leave_out_inner_pairs() {  ///< local
     if (!p_.freezing.inner_pairs_listed()) return;
     p_.meter.note_new_lists();
     const auto timed = p_.report.time(Part::load);

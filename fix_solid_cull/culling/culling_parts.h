@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "audit.h"
 #include "balance.h"
 #include "bed.h"
 #include "body_meshes.h"
@@ -57,6 +58,7 @@ struct CullingParts {
   Cover cover;
   Survey survey;
   Pacing pacing;
+  Audit audit;
 
   // what changes it
   StoreExchange exchange;

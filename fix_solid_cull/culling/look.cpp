@@ -32,6 +32,7 @@ void Look::look() {
   const bool may_cull = p_.pacing.may_cull(step) && !p_.gravity.turns();
   if (may_cull || any_culled) see_walls(false);
   chosen_ = survey(may_cull, any_culled);
+  p_.audit.see_look();
   if (judge(may_cull)) p_.ask_for_build(step + 1);
   p_.pacing.schedule(step, bed_.census.something_locked(), bed_.census.something_stored());
   p_.forecaster.see_look();

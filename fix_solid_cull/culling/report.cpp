@@ -16,9 +16,10 @@ double Report::value(int n) {
   totals_version_ = membership_version_;
   if (totals_.empty()) count_totals();
   if (n < counts) return totals_[n];
-  if (n >= size - gains) {
+  if (n >= size - audited) return of_audits(n - (size - audited));
+  if (n >= size - audited - gains) {
     const Forecast& f = forecast_;
-    return std::array<double, gains>{meter_.times_less(), f.times_less, f.awake, f.moving}[n - (size - gains)];
+    return std::array<double, gains>{meter_.times_less(), f.times_less, f.awake, f.moving}[n - (size - audited - gains)];
   }
   if (n >= counts + carried + of_all + again) return spent_[n - counts - carried - of_all - again];
   if (n >= counts + carried + of_all) return rests_again_[n - counts - carried - of_all];
@@ -28,6 +29,12 @@ double Report::value(int n) {
   }
   if (all_.empty()) sum_all();
   return all_[n - counts - carried];
+}
+
+double Report::of_audits(int n) const {
+  if (n == 0) return static_cast<double>(audit_.tally().patches());
+  const Interval i = audit_.tally().interval(static_cast<AuditTally::Figure>((n - 1) / 2));
+  return n % 2 ? i.low : i.high;
 }
 
 void Report::count_totals() {

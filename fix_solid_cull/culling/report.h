@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "audit.h"
 #include "bed.h"
 #include "body_motion.h"
 #include "forecast.h"
@@ -21,10 +22,12 @@ class Report {
   static constexpr int again = 2;     ///< how many were culled again, and how many of them had moved
   static constexpr int spent = 3;     ///< granule-steps: exterior, interface, interior
   static constexpr int gains = 4;     ///< times less work as measured and as forecast, and shares awake and moving that rests on
-  static constexpr int size = counts + carried + of_all + again + spent + gains;
+  static constexpr int audited = 7;   ///< patches, and the ends of the intervals of AuditTally's figures
+  static constexpr int size = counts + carried + of_all + again + spent + gains + audited;
   static constexpr int interior = 2;  ///< index of f_ID itself among them
 
-  Report(const Bed& bed, const BodyMotion& motion, const WorkMeter& meter) : bed_(bed), motion_(motion), meter_(meter) {}
+  Report(const Bed& bed, const BodyMotion& motion, const WorkMeter& meter, const Audit& audit)
+      : bed_(bed), motion_(motion), meter_(meter), audit_(audit) {}
 
   /// What f_ID says of it from now on; before, nothing is known. Alike on all ranks.
   void set_forecast(const Forecast& f) { forecast_ = f; }
@@ -41,12 +44,14 @@ class Report {
 
  private:
   void count_totals();
+  double of_audits(int n) const;
   void sum_carried();
   void sum_all();
 
   const Bed& bed_;
   const BodyMotion& motion_;
   const WorkMeter& meter_;
+  const Audit& audit_;
   StopWatch watch_;
   Forecast forecast_;
   std::array<double, again> rests_again_{};

@@ -15,6 +15,7 @@ void RunEnd::tell() {
   if (run.seconds_without > 0) meter_.compare(run.work.seconds, run.seconds_without);
   run.runs = meter_.compared();
   run.times_less = meter_.times_less();
+  run.audit = text_of(audit_.tally(), audit_.steps(), bed_.scales.diameter());
   if (run.work.steps > 0) bed_.run.say(text_of(run, bed_.scales.settings()));
   const std::string balanced = balance_.end_run();
   if (bed_.scales.settings().report != ReportLength::full) return;

@@ -1,6 +1,7 @@
 // The end of a run: what the user is told, in a few lines.
 #pragma once
 
+#include "audit.h"
 #include "balance.h"
 #include "bed.h"
 #include "report.h"
@@ -10,8 +11,8 @@ namespace solidcull {
 
 class RunEnd {
  public:
-  RunEnd(const Bed& bed, WorkMeter& meter, Report& report, Balance& balance)
-      : bed_(bed), meter_(meter), report_(report), balance_(balance) {}
+  RunEnd(const Bed& bed, WorkMeter& meter, Report& report, Balance& balance, const Audit& audit)
+      : bed_(bed), meter_(meter), report_(report), balance_(balance), audit_(audit) {}
 
   /// Nothing after a run of no step; with `report full`, all counters too, after any. Collective.
   void tell();
@@ -21,6 +22,7 @@ class RunEnd {
   WorkMeter& meter_;
   Report& report_;
   Balance& balance_;
+  const Audit& audit_;
 };
 
 }  // namespace solidcull

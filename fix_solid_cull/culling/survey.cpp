@@ -49,6 +49,15 @@ void Survey::forget_calm() {
     if (!bed_.shell[i].locked) rows_[i].calm = 0;
 }
 
+// ------------------------------------------------------------------------------------------------------------ what is watched
+
+void Survey::watch(bool lasts) {
+  watches_ = lasts;
+  // of audits before
+  for (int i = 0; lasts && i < bed_.atoms.owned; ++i)
+    if (rows_[i].woke_by == Woke::audit) rows_[i].woke_by = Woke::load;
+}
+
 // ------------------------------------------------------------------------------------------------------------ what is awake
 
 void Survey::begin_count() {
@@ -282,7 +291,7 @@ std::int64_t Survey::find_calm(const Patience& patience, Proposal& proposal) {
   for (int i = 0; i < bed_.atoms.owned; ++i) {
     if (bed_.shell[i].locked) continue;
     why_[i] = see(i, seen, law);
-    const bool solid = why_[i] == Awake::settling;
+    const bool solid = why_[i] == Awake::settling && !is_watched(i);
     rows_[i].calm = solid ? rows_[i].calm + 1 : 0;
     if (why_[i] == Awake::moving && seen.moving[i] == nearly_quiet)
       awake_.nearly_slow += law.balanced(seen.acceleration[i], frame_of(i, seen));

@@ -88,6 +88,9 @@ class Survey {
     rows_[i].woke_by = by;
     rows_[i].woke_at = bed_.atoms.place(i);
   }
+  /// What audits wake is not culled while one lasts. Local.
+  void watch(bool lasts);
+  bool is_watched(int i) const { return watches_ && rows_[i].woke_by == Woke::audit; }
   /// It is locked; if it had been before: whether it has moved by more than d/100 since, where nothing carries it along.
   enum class Rested { first_time, unmoved, moved };
   Rested note_lock(int i) {
@@ -157,6 +160,7 @@ class Survey {
   PerGranule<AtRest> rows_;
   std::vector<Awake> why_;  // of owned granules, as this look sees them
   AwakeSteps awake_;        // what find_calm() has counted
+  bool watches_ = false;
 };
 
 }  // namespace solidcull

@@ -29,6 +29,7 @@ enum class Woke : unsigned char {
   deck,       ///< a command, a program or another fix took it
   no_gain,    ///< culling did not pay
   lost,       ///< a sphere of its clump left the simulation
+  audit,      ///< it was drawn for an audit
   count
 };
 

@@ -69,6 +69,8 @@ const char* words_for(Woke by) {
       return "culling did not pay";
     case Woke::lost:
       return "parts of clumps that were lost";
+    case Woke::audit:
+      return "audits";
     case Woke::never:
     case Woke::count:
       break;
@@ -118,6 +120,7 @@ std::string text_of(const RunSummary& run, const Settings& settings) {
   if (w.woken.all() > 0) line("woken by", reasons(w.woken) + format(", of %.0f", w.woken.all()));
   const std::string advice = advice_on(w, settings);
   if (!advice.empty()) line("advice", advice);
+  if (!run.audit.empty()) line("audit", run.audit);
   return text;
 }
 

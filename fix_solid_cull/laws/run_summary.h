@@ -14,6 +14,7 @@ struct RunSummary {
   double seconds_without = 0;  ///< that it would have taken without the fix; 0: not known
   int runs = 0;                ///< of this fix of which that is known, this one included
   double times_less = 0;       ///< how many times longer those would have taken
+  std::string audit;           ///< see audit_tally.h
 };
 
 /// Lines, without the last one's end: the first says how long the run was, the others are indented. What is not known has no

@@ -111,6 +111,12 @@ const std::map<std::string, Reader>& readers() {
          s.balance_every = v.whole(wanted, 1);
          s.balance_threshold = v.number(wanted, 1, false);
        }},
+      {"audit",
+       [](Values& v, Settings& s) {
+         const char* wanted = "two whole numbers N K: steps from one audit to the next, patches that each wakes";
+         s.audit_every = v.whole(wanted, 1);
+         s.audit_patches = v.whole(wanted, 1);
+       }},
       {"report",
        [](Values& v, Settings& s) {
          v.one_of("'short' or 'full'",

@@ -42,6 +42,8 @@ struct Settings {
   double voxel = 0.5;            ///< in mean diameters
   int balance_every = 0;         ///< steps between two looks at the work of ranks; 0: cuts between them stay
   double balance_threshold = 0;  ///< largest work of a rank over the mean from which cuts move
+  int audit_every = 0;           ///< steps between the beginnings of two audits; 0: none
+  int audit_patches = 0;         ///< patches that each wakes
   ReportLength report = ReportLength::brief;
   bool reasons = false;            ///< per atom, what keeps it awake and what woke it too
   std::vector<MeshOutput> meshes;  ///< the keyword may stand more than once

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..dumps import snapshots
 from ..errors import RunError
+from ..logs import loops
 from . import fields
 from .points import ALSO, BY_HAND, PAPER, UNCULLED
 
@@ -46,6 +47,8 @@ def run_data(job, run):
         counts |= {name: float(run.counts[name][-1]) for name in ("culled", "restored", "carves", "seconds", "restore_energy")}
     data = {"k": job.k, "seconds": round(run.own_time, 3), "steps": run.steps(), "counts": counts, "values": run.metrics,
             "granules": None if run.final is None else len(run.final)}
+    if job.point.default:
+        data["loops"] = loops(job.file(".log").read_text(errors="replace"))
     if job.point.default and job.scene == job.case.main_scene:
         data["curves"] = {metric: curve(run, column) for metric, column in job.case.get("curves", {}).items()}
     return data
@@ -137,6 +140,11 @@ def laws_of(case, result, laws):
 
 def results_file(out, case):
     return Path(out) / case.name / "results.json"
+
+
+def kept_file(kept, case):
+    """With the sources."""
+    return Path(kept) / f"{case.name}.json"
 
 
 def read_result(file):

@@ -1,8 +1,9 @@
-"""validation/run.sh [--quick|--full] [--decide|--no-decide] [--report-only|--few-steps] [--publish] [--also KEYWORDS] [--ranks N] [--at-once N] [CASE ...]
+"""validation/run.sh [--quick|--full] [--decide|--no-decide] [--report-only|--few-steps] [--keep] [--publish] [--also KEYWORDS] [--ranks N] [--at-once N] [CASE ...]
 
 Runs cases, unculled and culled, and writes the report. `--decide`, a part of `--full`: pairs of runs are added until each metric is
 equivalent or outside, 30 at most. What was run before, with the same deck and the same fix, is not run again:
-after a kill the same command goes on. `--few-steps`: each deck once unculled and once culled, cut short; no report.
+after a kill the same command goes on. `--keep` keeps results of cases with the sources: so a report may take several sittings, on
+machines that know nothing of each other. `--few-steps`: each deck once unculled and once culled, cut short; no report.
 Exit: 0 the report is written and nothing is lost, 1 a granule is lost, 2 a case or run failed (one line each).
 """
 import argparse
@@ -36,6 +37,8 @@ def options(argv):
     p.add_argument("--at-once", type=int, default=None, metavar="N", help="runs at the same time (default: one rank a core)")
     p.add_argument("--out", type=Path, default=HERE / "out", metavar="FOLDER", help="beds, logs and results")
     p.add_argument("--report", type=Path, default=None, metavar="FOLDER", help="default: validation/report/SIZE")
+    p.add_argument("--keep", action="store_true", help="keep the results of each case with the sources, for reports of cases that were run elsewhere")
+    p.add_argument("--kept", type=Path, default=HERE / "kept", metavar="FOLDER", help="where they are kept (default: validation/kept)")
     p.add_argument("--publish", action="store_true", help="keep the report with the sources: validation/RESULTS.md, results.json, and the README's rows")
     p.set_defaults(size="quick")
     a = p.parse_args(argv)
@@ -56,8 +59,8 @@ def say(line):
     print(line, flush=True)
 
 
-def run_case(case, jobs, course, out, maker=None):
-    """Runs it and leaves its results; the lines of what failed. `maker`: of more runs, until its metrics are decided."""
+def run_case(case, jobs, course, files, out, maker=None):
+    """Runs it and leaves its results in these files; the lines of what failed. `maker`: of more runs, until its metrics are decided."""
     done = case_runs.run_all(jobs, course)
     while maker and (wanted := deciding.further(case, done)):
         more = [job for scene, of_scene in wanted.items() for job in maker.jobs(scene, of_scene)]
@@ -65,10 +68,11 @@ def run_case(case, jobs, course, out, maker=None):
         done |= case_runs.run_all(more, course)
     result = case_results.result_of(case, done, bool(maker))
     draw(case, done, out / case.name / "what_moves.png")
-    file = case_results.results_file(out, case)
-    part = file.with_suffix(".part")
-    part.write_text(json.dumps(result) + "\n")
-    part.rename(file)
+    for file in files:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part = file.with_suffix(".part")
+        part.write_text(json.dumps(result) + "\n")
+        part.rename(file)
     return [f"{case.name}: {f['why']}" for f in result["failed"]]
 
 
@@ -85,7 +89,7 @@ def draw(case, done, file):
 
 def run(a):
     size = a.size + (f"-{a.ranks}-ranks" if a.ranks > 1 else "")
-    out = a.out / size
+    out, kept = a.out / size, a.kept / size
     wanted = cases.load(a.case, a.size)
     failed = []
     if a.few_steps:
@@ -106,14 +110,15 @@ def run(a):
         for case, of_case in jobs.items():
             try:
                 maker = case_runs.Maker(case, out, beds, launcher, fix, a.ranks) if a.decide else None
-                failed += run_case(case, of_case, course, out, maker)
+                files = [case_results.results_file(out, case)] + [case_results.kept_file(kept, case)] * a.keep
+                failed += run_case(case, of_case, course, files, out, maker)
             except RunError as e:
                 failed.append(str(e))
                 say(f"{case.name}: {e}")
     results = []
     for case in wanted if a.case else cases.load([], a.size):
-        file = case_results.results_file(out, case)
-        if file.exists():
+        file = next((f for f in (case_results.results_file(out, case), case_results.kept_file(kept, case)) if f.exists()), None)
+        if file:
             results.append(case_results.read_result(file))
         elif a.report_only:
             say(f"{case.name} has no results; run it first")

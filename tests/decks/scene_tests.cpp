@@ -98,6 +98,23 @@ TEST(Scenes, ABedThatSleepsStillWeighsOnItsWalls) {
   EXPECT_LT(lowest(), before - 0.0005) << "nothing follows the floor";
 }
 
+/// Its surface is awake. What lies below it moves no farther when it is woken.
+TEST(Scenes, AuditsOfABedAtRestFindThatNothingIsMissed) {
+  Engine e;
+  const Bed bed = mesh_bed("audited");
+  e.run(read_bed(bed) + "run 50\n");
+  const double floor = e.vector("floor", 3);
+  e.run("fix cull all solid/cull exterior live every 20 calm 2 depth 1.5 audit 300 3\nrun 2100\n");
+  expect_all_there(e, "cull", 1300);
+  EXPECT_GT(f(e, 3), 100);
+  EXPECT_GE(f(e, 38), 6);  // patches
+  EXPECT_GE(f(e, 7), f(e, 38)) << "restored for it";
+  EXPECT_GT(f(e, 40), 0);
+  EXPECT_LT(f(e, 40), 2e-4 * diameter);
+  EXPECT_LT(f(e, 44), 1e-9);  // J: of a granule of 2e-5 kg that falls by 5 nm
+  EXPECT_NEAR(e.vector("floor", 3), floor, 1e-3 * std::abs(floor));
+}
+
 TEST(Scenes, GranulesThatSpinOnTheSpotSleepAndGoOnSpinning) {
   // 64 that spin about the normal of the floor, each beside one that it does not touch: a rank of eight has enough to store them
   Bed bed = mesh_bed("asleep");

@@ -38,6 +38,7 @@ class Grammar(MoreEvents):
     def __init__(self, seed, between="all", ranks=None, more=True, library=None, clumps=False):
         self.rng = random.Random(f"solidcull {seed}")
         self.rng_of_balance = random.Random(f"balance {seed}")  # its own, so that a deck is otherwise the same without it
+        self.rng_of_audits = random.Random(f"audits {seed}")    # likewise
         self.seed, self.between, self.ranks, self.clumps = seed, between, ranks, clumps
         self.more = more and between == "all"
         self.library = self.more and (self.chance(0.2) if library is None else library)
@@ -286,9 +287,13 @@ class Grammar(MoreEvents):
         rng = self.rng_of_balance
         return [f"balance {rng.choice((10, 50, 100))} {rng.choice((1.05, 1.2, 2))}"] if rng.random() < 0.5 else []
 
+    def audits(self):
+        rng = self.rng_of_audits
+        return [f"audit {rng.choice((20, 60, 200))} {rng.choice((1, 4, 20))}"] if rng.random() < 0.3 else []
+
     def cull(self):
         balance = self.balance()
-        self.parts.append(CullLine([], needed=True, keywords=self.keywords() + balance))
+        self.parts.append(CullLine([], needed=True, keywords=self.keywords() + balance + self.audits()))
         self.culling, self.balanced = True, bool(balance)
 
     # --- what happens then

@@ -53,6 +53,8 @@ void expect_same(const Settings& a, const Settings& b) {
   EXPECT_EQ(a.voxel, b.voxel);
   EXPECT_EQ(a.balance_every, b.balance_every);
   EXPECT_EQ(a.balance_threshold, b.balance_threshold);
+  EXPECT_EQ(a.audit_every, b.audit_every);
+  EXPECT_EQ(a.audit_patches, b.audit_patches);
   EXPECT_EQ(a.report, b.report);
   EXPECT_EQ(a.reasons, b.reasons);
   EXPECT_EQ(listed(a.meshes), listed(b.meshes));
@@ -103,13 +105,15 @@ TEST(Settings, every_keyword_is_parsed) {
   due.voxel = 0.25;
   due.balance_every = 1000;
   due.balance_threshold = 1.2;
+  due.audit_every = 2000;
+  due.audit_patches = 4;
   due.report = ReportLength::full;
   due.reasons = true;
   due.meshes = {{100, "out/mesh.*.vdb"}};
   due.beds = {{200, "bed.vtp"}};
   const std::string line =
       "every 40 depth 3.5 exterior live speed 1e-3 calm 5 tolerance 0.5 0.1 carve 1.5 6 store exact "
-      "restore exact voxel 0.25 balance 1000 1.2 report full reasons yes mesh 100 out/mesh.*.vdb bed 200 bed.vtp";
+      "restore exact voxel 0.25 balance 1000 1.2 audit 2000 4 report full reasons yes mesh 100 out/mesh.*.vdb bed 200 bed.vtp";
   expect_same(parsed(line), due);
   std::set<std::string> named;
   for (const std::string& w : words(line)) named.insert(w);
@@ -255,6 +259,13 @@ const Refusal refusals[] = {
     {"voxel fine", "keyword 'voxel' has the value 'fine': give a size in mean diameters, 0.1 to 2"},
     {"voxel", "keyword 'voxel' ends too early: give a size in mean diameters, 0.1 to 2"},
 
+    {"audit 0 4",
+     "keyword 'audit' has the value '0': give two whole numbers N K: steps from one audit to the next, patches that each wakes"},
+    {"audit 1000",
+     "keyword 'audit' ends too early: give two whole numbers N K: steps from one audit to the next, patches that each wakes"},
+    {"audit 1000 0.5",
+     "keyword 'audit' has the value '0.5': give two whole numbers N K: steps from one audit to the next, patches that each "
+     "wakes"},
     {"balance 0 1.1",
      "keyword 'balance' has the value '0': give a whole number of steps, 1 or more, and the largest work of a rank over the "
      "mean, more than 1"},
@@ -289,12 +300,14 @@ const Refusal refusals[] = {
     {"depth 0.8 exterior live", "voxel 0.5 is too coarse for depth 0.8: choose voxel <= depth/2"},
 
     {"deptth 2",
-     "unknown keyword 'deptth': choose from balance, bed, calm, carve, depth, every, exterior, mesh, reasons, report, restore, "
+     "unknown keyword 'deptth': choose from audit, balance, bed, calm, carve, depth, every, exterior, mesh, reasons, report, "
+     "restore, "
      "speed, "
      "store, "
      "tolerance, voxel"},
     {"calm 3 4",
-     "unknown keyword '4': choose from balance, bed, calm, carve, depth, every, exterior, mesh, reasons, report, restore, speed, "
+     "unknown keyword '4': choose from audit, balance, bed, calm, carve, depth, every, exterior, mesh, reasons, report, restore, "
+     "speed, "
      "store, "
      "tolerance, voxel"},
 };
