@@ -276,10 +276,11 @@ class KeywordRefusals(Case):
         "voxel fine": ("voxel", "fine", VOXEL), "voxel 0.05": ("voxel", "0.05", VOXEL), "voxel": ("voxel", None, VOXEL),
         "mesh x a.stl": ("mesh", "x", FILE), "mesh 10 a.obj": ("mesh", "a.obj", MESH), "mesh 10": ("mesh", None, MESH),
         "mesh 10 a.vtp least 0": ("mesh", "0", LEAST), "mesh 10 a.vtp skin least": ("mesh", None, LEAST), "mesh 10 a.vtp least all": ("mesh", "all", LEAST),
+        "audit 0 4": ("audit", "0", AUDIT), "audit 100 few": ("audit", "few", AUDIT), "audit 100": ("audit", None, AUDIT),
         "balance 0 1.1": ("balance", "0", BALANCE), "balance 50 1": ("balance", "1", BALANCE), "balance 50": ("balance", None, BALANCE),
         "bed 0 a.vtp": ("bed", "0", FILE), "bed 10 a.stl": ("bed", "a.stl", BED), "bed": ("bed", None, FILE),
     }
-    KEYWORDS = "balance, bed, calm, carve, depth, every, exterior, mesh, reasons, report, restore, speed, store, tolerance, voxel"
+    KEYWORDS = "audit, balance, bed, calm, carve, depth, every, exterior, mesh, reasons, report, restore, speed, store, tolerance, voxel"
 
     def test_wrong_type_range_and_missing_values(self):
         for words, (keyword, value, wanted) in self.WRONG.items():

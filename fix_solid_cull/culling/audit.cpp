@@ -37,7 +37,7 @@ void Audit::see_look() {
   if (!runs() && step >= next_ && bed_.census.something_locked()) begin();
 }
 
-/// Of standing bodies, what is near something awake: as many as are wanted, no two patches of which reach into each other.
+/// Of bodies that rest, what is near something awake: as many as are wanted, no two patches of which reach into each other.
 std::vector<Audit::Centre> Audit::draw_centres() const {
   const Atoms& atoms = bed_.atoms;
   std::vector<char> near(static_cast<std::size_t>(atoms.owned), 0);
@@ -50,7 +50,7 @@ std::vector<Audit::Centre> Audit::draw_centres() const {
   std::vector<Centre> drawn;
   for (std::size_t k = 0; k < motion_.interface_atoms().size(); ++k) {
     const int i = motion_.interface_atoms()[k];
-    if (near[i] && motion_.active()[motion_.slot(k)].stands)
+    if (near[i] && rests(motion_.active()[motion_.slot(k)], atoms.place(i)))
       drawn.push_back({lot_of(atoms.tag[i], bed_.run.step), triple(atoms.place(i)), atoms.tag[i]});
   }
   const auto by_lot = [](const Centre& a, const Centre& b) { return a.lot != b.lot ? a.lot < b.lot : a.tag < b.tag; };
@@ -80,9 +80,16 @@ void Audit::begin() {
   if (runs()) survey_.watch(true);
 }
 
-double Audit::way(int atom) const {
-  const Vec3 from = survey_[atom].woke_at;
-  return (bed_.solid.nearest_image(bed_.atoms.place(atom), from) - from).norm();
+/// No part of it there is faster than solid state may be.
+bool Audit::rests(const ActiveBody& b, const Vec3& there) const {
+  return b.stands || b.body->twist.at(there).norm() < bed_.scales.solid_state().speed;
+}
+
+/// Beside what its body would have carried it along (m).
+double Audit::way(const Woken& w) const {
+  const Vec3 from = survey_[w.atom].woke_at;
+  const double seconds = static_cast<double>(bed_.run.step - began_) * bed_.run.dt;
+  return (bed_.solid.nearest_image(bed_.atoms.place(w.atom), from) - from - seconds * w.carried).norm();
 }
 
 /// In the first step after they have woken, before anything has moved.
@@ -99,6 +106,7 @@ void Audit::meet_woken() {
     w.tag = atoms.tag[i];
     w.patch = static_cast<int>(ball - balls_.begin());
     w.deep = bed_.shell[i].came_back > began_;
+    w.carried = atoms.velocity(i);
     tags.push_back(w.tag);
     woken_.push_back(w);
   }
@@ -216,8 +224,8 @@ void Audit::end_around(const std::vector<Ball>& balls) {
 /// What it has done until now; its contacts press with `load`.
 void Audit::take_leave(Woken& w, double load) const {
   w.did.granules = 1;
-  w.did.moved = way(w.atom);
-  w.did.energy = 0.5 * bed_.atoms.mass[w.atom] * bed_.atoms.velocity(w.atom).squaredNorm();
+  w.did.moved = way(w);
+  w.did.energy = 0.5 * bed_.atoms.mass[w.atom] * (bed_.atoms.velocity(w.atom) - w.carried).squaredNorm();
   if (!w.deep || walls_[w.atom].touched > 0) return;  // what walls press with is not known of both times
   w.did.deep = 1;
   w.did.load = w.load;

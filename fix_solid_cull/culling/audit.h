@@ -55,6 +55,7 @@ class Audit {
     double tolerance;  // N
     double load;       // what its contacts pressed with at first (N)
     AuditedPatch did;  // it alone, until it ended
+    Vec3 carried;      // velocity of its body there (m/s)
     Vec3 felt_then;    // from what is awake without this, at first (N)
   };
   struct Pair {
@@ -73,7 +74,8 @@ class Audit {
   std::vector<double> pressing() const;
   std::vector<Vec3> felt() const;
   void end_around(const std::vector<Ball>& balls);
-  double way(int atom) const;
+  bool rests(const ActiveBody& b, const Vec3& there) const;
+  double way(const Woken& w) const;
   void take_leave(Woken& w, double load) const;
   void end();
   void stop();

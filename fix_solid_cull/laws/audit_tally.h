@@ -34,7 +34,7 @@ class AuditTally {
   const AuditedPatch& all() const { return all_; }
   /// Holds the mean of what sleeps near what is awake, in 90 of 100 cases; 0 to 0 where there are fewer than `fewest` patches.
   Interval interval(Figure figure) const;
-  static constexpr std::size_t fewest = 4;
+  static constexpr std::size_t fewest = 6;
 
  private:
   std::vector<AuditedPatch> patches_;

@@ -62,7 +62,7 @@ TEST(AuditTally, a_few_patches_tell_nothing) {
   EXPECT_EQ(t.patches(), 0u) << "nothing slept there";
   for (std::size_t n = 0; n + 1 < AuditTally::fewest; ++n) t.add(patch(2e-6, 0.01, 0));
   EXPECT_EQ(t.interval(AuditTally::moved).high, 0);
-  EXPECT_EQ(text_of(t, 100, 0.0026), "3 patches, 120 granules, 15 of which woke anyway: too few to tell");
+  EXPECT_EQ(text_of(t, 100, 0.0026), "5 patches, 200 granules, 25 of which woke anyway: too few to tell");
 }
 
 TEST(AuditTally, loads_that_nobody_could_compare_are_not_told) {
