@@ -16,7 +16,7 @@ from pathlib import Path
 from .. import engine, errors
 from .handed_over import make
 from .material import read_material
-from .plan import Plan
+from .plan import TILE, Plan
 from .wanted import Wanted, read_sizes, refuse
 
 NAME = "solidcull-bed"
@@ -39,7 +39,7 @@ def parser():
     p.add_argument("--material", required=True, metavar="FILE", help="lines of a deck: pair_style, properties, timestep, gravity, variable contact")
     p.add_argument("--seed", type=int, default=1, help="another one gives another bed (default 1)")
     p.add_argument("--top", type=float, metavar="Z", help="m: height of LIGGGHTS's box (default: 4 depths)")
-    p.add_argument("--tile", type=float, default=27, metavar="D", help="least edge of a tile, in largest diameters (default 27)")
+    p.add_argument("--tile", type=float, default=TILE, metavar="D", help=f"least edge of a tile, in largest diameters (default {TILE})")
     p.add_argument("--launcher", help=f"default: {engine.NAMED_BY}, else build/liggghts-solidcull, else the one on the PATH")
     return p
 

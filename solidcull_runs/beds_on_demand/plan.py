@@ -7,6 +7,7 @@ import math
 from .wanted import Wanted
 
 LEAST = 3            # tiles a side
+TILE = 27            # least edge of a tile, in largest diameters
 MARGIN = 0.2         # largest diameters: a side stands as far outside of the tiles. So much room a side costs a poured bed
 LITTLE = 0.3         # of gravity, while the sides come to their places
 MOST = 0.94          # of gravity, until the sides have their friction
@@ -37,7 +38,7 @@ class Plan:
         self.copies = tuple(int(side / edge + 1e-9) for side in inside)
         self.laid = min(self.copies) >= LEAST
         self.least_box = LEAST * edge + 2 * self.margin
-        self.period = tuple(side / n for side, n in zip(inside, self.copies)) if self.laid else None
+        self.period = tuple(round(side / n, 12) for side, n in zip(inside, self.copies)) if self.laid else None
         self.top = w.top or 4 * self.depth
         self.beyond = 2 * w.largest  # how far LIGGGHTS's box and the floor reach out of the sides
 
