@@ -5,6 +5,7 @@
 | `wanted` | what the user asks for, and what of it is refused |
 | `material` | the user's material file: what a deck must say, and the numbers that are needed of it |
 | `plan` | tiles, numbers of granules, and the variables of the decks |
+| `measures` | height and solid fraction of a bed |
 | `pieces` | tile, bed of 3 x 3 tiles and its culled file: made once and kept |
 | `handed_over` | the files that the user gets |
 | `command` | the command line |

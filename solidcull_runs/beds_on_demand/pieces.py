@@ -27,6 +27,7 @@ class Pieces:
         (self.folder / "material.in").write_text(plan.wanted.material.text)
         (self.folder / "sizes.in").write_text(plan.sizes_deck())
         self.launcher = launcher
+        self.cores = 0.0  # s that LIGGGHTS had a core
         self.element = max(plan.period) / 2 if plan.laid else max(plan.wanted.length, plan.wanted.width) / 6
 
     def recipe(self, deck, variables, *more):
@@ -34,16 +35,20 @@ class Pieces:
         return "\n".join([json.dumps(variables), text, self.plan.wanted.material.text, self.plan.sizes_deck(), *more])
 
     def run(self, deck, name, variables):
-        return engine.Process(self.launcher, HERE / deck, self.folder, self.folder / f"{name}.log", variables).wait()
+        process = engine.Process(self.launcher, HERE / deck, self.folder, self.folder / f"{name}.log", variables)
+        text = process.wait()
+        self.cores += process.cpu
+        return text
 
     def made(self, name, recipe, make):
         """The piece `name`.restart, and what make(part) said of it, kept beside it."""
         facts = self.folder / f"{name}.json"
 
         def make_and_note(part):
-            began = time.monotonic()
+            began, cores = time.monotonic(), self.cores + time.process_time()
             found = make(part)
-            facts.write_text(json.dumps({**found, "seconds": round(time.monotonic() - began, 1)}) + "\n")
+            spent = {"seconds": time.monotonic() - began, "on a core": self.cores + time.process_time() - cores}
+            facts.write_text(json.dumps({**found, **{name: round(s, 1) for name, s in spent.items()}}) + "\n")
         file = beds.made(self.folder / f"{name}.restart", recipe, make_and_note, say=self.say)
         return file, json.loads(facts.read_text())
 

@@ -1,4 +1,5 @@
-"""What is compared of a bed: figures by name, of its granules' places alone. At rest a normal contact force is Hertz's of the overlap."""
+"""What is compared of a bed: figures by name, of its granules' places alone. At rest a normal contact force is Hertz's of the overlap.
+All but the floor's share and the coordination number of all are such that the size of the box does not matter."""
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -42,13 +43,15 @@ def floor_load(bed):
     return float(hertz(bed["radius"], bed["radius"] - bed["z"]).sum())
 
 
-def figures(bed, sides, depth, gravity):
-    """By name."""
+def figures(bed, sides, depth, gravity, margin):
+    """By name. `margin` (m): room that a side costs."""
     area, d = sides[0] * sides[1], 2 * bed["radius"].mean()
     weight = bed["mass"].sum() * gravity
+    inside = (sides[0] - 2 * margin) * (sides[1] - 2 * margin)
+    liquid = 2 * sum(sides) * weight / area * depth / 2  # N: what a liquid of that weight would press on the sides
     edges = np.linspace(0, depth, BANDS + 1)
     found = {f"solid fraction, {20 * k} to {20 * k + 20} % of the depth": float(phi)
-             for k, phi in enumerate(measures.solid_fractions(bed, area, edges))}
+             for k, phi in enumerate(measures.solid_fractions(bed, inside, edges))}
     distance = np.min([bed["x"], sides[0] - bed["x"], bed["y"], sides[1] - bed["y"]], axis=0)
     near = distance < LAYER * d
     inner = [s - 2 * LAYER * d for s in sides]
@@ -61,10 +64,10 @@ def figures(bed, sides, depth, gravity):
     found["coordination number near the sides"] = float(touches[near].mean())
     found["load on the floor, share of the weight"] = floor_load(bed) / weight
     height, load = on_sides(bed, sides)
-    found["load on the sides, share of the weight"] = float(load.sum() / weight)
+    found["load on the sides, over that of a liquid"] = float(load.sum() / liquid)
     for k, name in enumerate(("lowest", "middle", "highest")):
         there = (height >= k * depth / THIRDS) & ((height < (k + 1) * depth / THIRDS) | (k == THIRDS - 1))
-        found[f"load on the sides, {name} third"] = float(load[there].sum() / weight)
+        found[f"load on the sides, {name} third"] = float(load[there].sum() / liquid)
     mean = force.mean()
     found["contact force, mean over the weight of a granule"] = float(mean / (weight / len(bed)))
     for share, value in zip(SHARES, np.percentile(force, SHARES)):
