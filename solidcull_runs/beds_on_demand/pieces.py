@@ -90,8 +90,8 @@ class Pieces:
             tiles.lay(tiles.Bed(tile, (1, 1), plan.period, 0, True), laid, ALL, plan.period, plan.margin, plan.top, plan.beyond)
             text = self.run("rest.in", "base", {**variables, "tiles": laid.name, "floor": floor.name, "restart": part.name})
             laid.unlink()
-            said = re.findall(r"^the sides bear (\S+) N, the tile (\S+) N", text, re.M)[-1]
-            return {"sides bear (N)": float(said[0]), "tile across (N)": float(said[1])}
+            said = re.findall(r"^the sides bear (\S+) N, and are to bear (\S+) N", text, re.M)[-1]
+            return {"sides bear (N)": float(said[0]), "are to bear (N)": float(said[1])}
         file, _ = self.made("base", self.recipe("rest.in", variables, beds.recipe_of(tile)), make)
         return file, floor
 

@@ -11,6 +11,7 @@ TILE = 27            # least edge of a tile, in largest diameters
 MARGIN = 0.2         # largest diameters: a side stands as far outside of the tiles. So much room a side costs a poured bed
 LITTLE = 0.3         # of gravity, while the sides come to their places
 MOST = 0.995         # of gravity, until the sides have their friction
+ENOUGH = 1.05         # of what the tile bore across: the load goes down by so much more while the bed comes to rest
 PRESS = 0.008        # mean diameters: how much farther the sides go in each time
 PRESSES = 20
 PILOT = 10           # largest diameters: edge of the tile that tells how high granules stand
@@ -98,7 +99,7 @@ class Plan:
         return {**self.common(), "L": f"{sides[0]:.12g}", "W": f"{sides[1]:.12g}", "gravity": self.wanted.material.gravity_fix, "g": self.g,
                 "little": f"{LITTLE * self.g:.6g}",
                 "most": f"{MOST * self.g:.6g}", "gap": f"{self.wanted.largest - self.margin:.9g}", "press": f"{PRESS * self.d:.6g}",
-                "presses": PRESSES, "across": f"{MOST * 2 * (sides[1] * pushes[0] + sides[0] * pushes[1]):.9g}",
+                "presses": PRESSES, "across": f"{ENOUGH * MOST * 2 * (sides[1] * pushes[0] + sides[0] * pushes[1]):.9g}",
                 "pushsteps": self.steps(0.15 * unit), "settlesteps": self.steps(unit), "presssteps": self.steps(0.37 * unit), "gripsteps": self.steps(1.5 * unit)}
 
     def doze(self, sides):
