@@ -38,7 +38,7 @@ LARGE = {"1M": (10, 9), "10M": (30, 29)}             # tiles of the largest beds
 LARGE_EDGE, LARGE_DEPTH = 0.0757, 0.03           # m
 LAID_SEED, OTHER_SEED = 20, 1000                 # before the first of the laid beds, and of the poured ones
 AWAKE, FLOOR_OFF = 0.001, 0.001                  # allowed after 1,000 steps
-FEW = {"TILE": 8, "EDGE": 0.0225, "DEPTH": 0.0115, "GRANULES": 350, "COPIES": {"nine": (3, 3)}, "OUT": OUT / "few"}
+FEW = {"TILE": 8, "EDGE": 0.0225, "DEPTH": 0.0115, "GRANULES": 400, "COPIES": {"nine": (3, 3)}, "OUT": OUT / "few"}
 
 
 def plan_of(name, copies, seed, depth=None, tile=None, edge=None):
