@@ -10,6 +10,8 @@ line and compared.
 | `logs` | what a run printed |
 | `dumps` | the files that a run left |
 | `beds` | beds and other files that are made once and kept |
+| `laid` | beds laid of copies of a smaller one, as atoms or culled |
+| `beds_on_demand` | the program [solidcull-bed](../fix_solid_cull/solidcull_bed.md) |
 | `meshes` | triangles, and STL files of them |
 | `measures` | what is measured of a run: heights of the bed, sums over all granules |
 | `twins` | runs of both kinds, one after the other or several at once, and their comparison |

@@ -225,6 +225,15 @@ class Validation(Scripts):
         self.assertEqual({c["lost"] for c in choices.values()}, {0})
         self.assertGreater(choices["sleep"]["over_exterior"], choices["live"]["over_exterior"])
 
+    def test_beds(self):
+        folder = ROOT / "validation" / "beds"
+        nine = self.run_script(folder / "beds.py", folder / "out" / "few" / "beds.json")["sizes"]["nine"]
+        self.assertEqual((nine["beds"], nine["granules"], nine["lost"]), (2, 9 * 400, 0))
+        self.assertLess(nine["awake"], 0.001)
+        self.assertLess(nine["floor off"], 0.001)
+        self.assertLess(abs(nine["figures"]["coordination number"]["off"]), 5)  # %
+        self.assertIn("unknown: ten; sizes are nine", self.run_script(folder / "beds.py", None, "--sizes", "ten", status=2))
+
     def test_scale_tools(self):
         folder = ROOT / "validation" / "scale"
         tools = self.run_script(folder / "tools.py", folder / "out" / "few" / "tools.json")

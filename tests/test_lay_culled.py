@@ -9,11 +9,11 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "validation" / "scale")]
-import culled_files  # noqa: E402
-import lay_culled  # noqa: E402
 import scale  # noqa: E402
-import tiles  # noqa: E402
 from solidcull_runs import engine  # noqa: E402
+from solidcull_runs.laid import beds, culled_files, tiles  # noqa: E402
+from solidcull_runs.laid.floors import Floor  # noqa: E402
+from solidcull_runs.laid.sources import Source  # noqa: E402
 
 WIDE = (6, 4)
 HEAD = """atom_style granular
@@ -72,8 +72,8 @@ class LayCulled(unittest.TestCase):
 
     def laid(self, copies):
         file = self.place / f"laid-{copies[0]}-{copies[1]}.restart"
-        source = lay_culled.Source(self.small["restart"], (3, 3), scale.PERIOD, scale.MARGIN, lay_culled.Floor(self.small["floor"]))
-        count = lay_culled.lay(source, file, copies, lay_culled.Floor(self.floor(copies)), scale.TOP)
+        source = Source(self.small["restart"], (3, 3), scale.PERIOD, scale.MARGIN, Floor(self.small["floor"]))
+        count = beds.lay(source, file, copies, Floor(self.floor(copies)), scale.TOP)
         self.assertEqual(count, self.size * copies[0] * copies[1])
         return file
 
@@ -158,19 +158,19 @@ class LayCulled(unittest.TestCase):
                 self.assertIn(f"there are {self.size * WIDE[0] * WIDE[1] + 1} granules", done.stdout, done.stdout[-2000:] + done.stderr)
 
     def test_what_cannot_be_laid_is_refused(self):
-        floor = lay_culled.Floor(self.small["floor"])
+        floor = Floor(self.small["floor"])
         with self.assertRaisesRegex(culled_files.CulledFileError, "contacts reach over more than one tile"):
-            lay_culled.Source(self.small["restart"], (1, 9), scale.PERIOD, scale.MARGIN, floor)
+            Source(self.small["restart"], (1, 9), scale.PERIOD, scale.MARGIN, floor)
         with self.assertRaisesRegex(culled_files.CulledFileError, "no bed of 4 x 4 equal tiles"):
-            lay_culled.Source(self.small["restart"], (4, 4), scale.PERIOD, scale.MARGIN, floor)
+            Source(self.small["restart"], (4, 4), scale.PERIOD, scale.MARGIN, floor)
         with self.assertRaisesRegex(culled_files.CulledFileError, "holds no culled granules"):
-            lay_culled.Source(scale.bed("few-rested")["restart"], (3, 3), scale.PERIOD, scale.MARGIN, floor)
-        two = lay_culled.Source(self.small["restart"], (3, 3), scale.PERIOD, scale.MARGIN, floor)
+            Source(scale.bed("few-rested")["restart"], (3, 3), scale.PERIOD, scale.MARGIN, floor)
+        two = Source(self.small["restart"], (3, 3), scale.PERIOD, scale.MARGIN, floor)
         two.copies = (2, 3)
         self.assertEqual(two.like(1, 2, (2, 3)), 5)
         with self.assertRaisesRegex(culled_files.CulledFileError, "of 2 tiles in a row 5 cannot be laid"):
             two.like(1, 2, (5, 3))
-        two = lay_culled.Source(self.small["restart"], (3, 3), scale.PERIOD, scale.MARGIN, floor)
+        two = Source(self.small["restart"], (3, 3), scale.PERIOD, scale.MARGIN, floor)
         two.copies = (2, 3)
         self.assertEqual(two.like(1, 2, (2, 3)), 5)
         with self.assertRaisesRegex(culled_files.CulledFileError, "of 2 tiles in a row 5 cannot be laid"):
@@ -180,7 +180,7 @@ class LayCulled(unittest.TestCase):
         file = self.place / "broken.restart"
         file.write_bytes(broken)
         with self.assertRaisesRegex(culled_files.CulledFileError, "is damaged among its granules"):
-            lay_culled.Source(file, (3, 3), scale.PERIOD, scale.MARGIN, floor)
+            Source(file, (3, 3), scale.PERIOD, scale.MARGIN, floor)
 
 
 if __name__ == "__main__":

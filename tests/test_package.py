@@ -91,11 +91,13 @@ class Package(unittest.TestCase):
         doc = "usr/share/doc/solidcull/"
         for name in ("usr/bin/liggghts-solidcull", "usr/lib/libsolidcull.so", "usr/include/solidcull.h", "usr/share/man/man1/liggghts-solidcull.1",
                      "usr/lib/cmake/solidcull/solidcull-config.cmake", doc + "README.md", doc + "CHANGELOG.md", doc + "copyright",
+                     "usr/bin/solidcull-bed", "usr/share/man/man1/solidcull-bed.1", "usr/share/solidcull/solidcull_runs/beds_on_demand/pour.in",
                      doc + "examples/impact/impact.in", doc + "examples/impact/floor.stl"):
             self.assertIn(name, self.files)
         for page in ROOT.glob("fix_solid_cull/*.md"):
             self.assertIn(doc + "fix_solid_cull/" + page.name, self.files)
-        places = ("usr/bin/", "usr/lib/libsolidcull.so", "usr/lib/cmake/solidcull/", "usr/include/solidcull.h", "usr/share/man/man1/", doc)
+        places = ("usr/bin/", "usr/lib/libsolidcull.so", "usr/lib/cmake/solidcull/", "usr/include/solidcull.h", "usr/share/man/man1/",
+                  "usr/share/solidcull/", doc)
         self.assertEqual([f for f in self.files if not f.startswith(places)], [])
         for line in told(["dpkg-deb", "-c", self.deb]).splitlines():
             self.assertRegex(line, r"^(drwxr-xr-x|-rwxr-xr-x|-rw-r--r--) root/root ")
@@ -110,18 +112,25 @@ class Package(unittest.TestCase):
             dead = [f.text for f in check_words.dead_links(page) if not re.search(r"\.(py|h|cpp)$", f.text)]
             self.assertEqual(dead, [], page)
 
-    def test_man_page(self):
-        page = self.root / "usr/share/man/man1/liggghts-solidcull.1"
-        text = page.read_text()
-        self.assertIn(f'"solidcull {VERSION}"', text)
-        self.assertNotIn("@", text)
-        if shutil.which("man"):
-            self.assertEqual(subprocess.run(["man", "-l", "--warnings", page], env={**os.environ, "LC_ALL": "C.UTF-8", "MANROFFSEQ": ""},
-                                            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, check=True).stderr, b"")
+    def test_man_pages(self):
+        for name in ("liggghts-solidcull.1", "solidcull-bed.1"):
+            page = self.root / "usr/share/man/man1" / name
+            text = page.read_text()
+            self.assertIn(f'"solidcull {VERSION}"', text)
+            self.assertNotIn("@", text)
+            if shutil.which("man"):
+                self.assertEqual(subprocess.run(["man", "-l", "--warnings", page], env={**os.environ, "LC_ALL": "C.UTF-8", "MANROFFSEQ": ""},
+                                                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, check=True).stderr, b"")
 
     def test_it_runs_where_it_is_unpacked(self):
         self.assertEqual(told([self.root / "usr/bin/liggghts-solidcull", "-version"]), f"solidcull {VERSION}\n")
         self.run_impact(self.root / "usr/bin/liggghts-solidcull", self.root / "usr/share/doc/solidcull", self.folder / "unpacked")
+
+    def test_solidcull_bed_runs_where_it_is_unpacked(self):
+        env = {**engine.environment(1), engine.NAMED_BY: str(self.root / "usr/bin/liggghts-solidcull"), "PYTHONDONTWRITEBYTECODE": "1"}
+        said = told([self.root / "usr/bin/solidcull-bed", "--box", "0.024", "0.024", "--granules", "500", "--sizes", "0.0012:0.5,0.0014:0.5", "--density", "2500",
+                     "--material", ROOT / "validation/beds/material.in", self.folder / "bed.restart"], env=env)
+        self.assertIn("bed.restart: 500 granules", said)
 
     def test_programs_build_against_it(self):
         self.check_program(f"-Dsolidcull_DIR={self.root}/usr/lib/cmake/solidcull")

@@ -28,13 +28,14 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))
-import culled_files  # noqa: E402
-import lay_culled  # noqa: E402
 import published  # noqa: E402
-import tiles  # noqa: E402
 from solidcull_runs import beds, comparisons, decks, engine, errors, examples, logs, measures, plots, struck, tables  # noqa: E402
 from solidcull_runs.dumps import element_normal_loads, read_final  # noqa: E402
-from solidcull_runs.meshes import grid, stl_text  # noqa: E402
+from solidcull_runs.laid import beds as laid_beds  # noqa: E402
+from solidcull_runs.laid import culled_files, tiles  # noqa: E402
+from solidcull_runs.laid.floors import Floor  # noqa: E402
+from solidcull_runs.laid.floors import write_floor as write_grid  # noqa: E402
+from solidcull_runs.laid.sources import Source  # noqa: E402
 
 impact = examples.load("impact")  # how it measures the crater
 
@@ -44,7 +45,7 @@ FALL = 0.00224                 # m: what the ball of examples/impact falls befor
 NEAR = 0.03                                   # m: of the blow's own crater, around its middle
 SHIFTS = (0, 1e-5, -1e-5, 2e-5, -2e-5)      # m: the ball's x in each run
 PERIOD, GRANULES, TOP = 0.075, 20000, 0.12       # m, of the tile; m: height of the box
-MARGIN = tiles.GRANULE         # m: the sides stand as far outside of the tiles: no granule overlaps them
+MARGIN = 0.0014                # m, the largest radius: the sides stand as far outside of the tiles, so that no granule overlaps them
 ELEMENT = 0.0375               # m: edge of the floor's triangles
 SAMPLE = 0.5                   # s between two looks at the memory
 KINDS = ("unculled", "culled", "asleep", "control")
@@ -87,11 +88,7 @@ def tile(of):
 
 
 def write_floor(file, sides):
-    """The floor as a regular grid of triangles, in rows along y, two a square: element 2 (i ny + j) is the lower right one."""
-    edge = 2 * MARGIN  # how far it reaches beyond the sides
-    size = [s + 2 * edge for s in sides]
-    n = [max(1, round(s / ELEMENT)) for s in size]
-    file.write_text(stl_text("floor", grid((-edge, -edge, 0), (size[0], 0, 0), (0, size[1], 0), *n)))
+    write_grid(file, sides, 2 * MARGIN, ELEMENT)
 
 
 def bed(name):
@@ -100,7 +97,7 @@ def bed(name):
     sides, floor, granules = sides_of(copies), OUT / f"floor-{name}.stl", OUT / f"bed-{name}.npy"
     source_file = bed(source)["restart"] if source else tile(name)
     variables = {"L": sides[0], "W": sides[1], "dampsteps": damp, "stills": stills, "freesteps": free}
-    recipe = json.dumps([variables, copies, ELEMENT, TOP]) + text_of("relax.in", "material.in", "bed.in") + (HERE / "tiles.py").read_text() \
+    recipe = json.dumps([variables, copies, ELEMENT, TOP]) + text_of("relax.in", "material.in", "bed.in") + Path(tiles.__file__).read_text() \
         + beds.recipe_of(source_file)
 
     def make(part):
@@ -144,14 +141,13 @@ def asleep_bed(name):
         copies, of = LAID[name]
         source, made_of = asleep_bed(of), BEDS[of][0]
         floor, sides = OUT / f"floor-{name}.stl", sides_of(copies)
-        recipe = "\n".join([json.dumps([copies, made_of, ELEMENT, TOP]), (HERE / "lay_culled.py").read_text(),
-                            (HERE / "culled_files.py").read_text(), beds.recipe_of(source["restart"])])
+        recipe = "\n".join([json.dumps([copies, made_of, ELEMENT, TOP]), *(f.read_text() for f in sorted(Path(tiles.__file__).parent.glob("*.py"))),
+                            beds.recipe_of(source["restart"])])
 
         def make(part):
             write_floor(floor, sides)
             began = time.monotonic()
-            laid = lay_culled.lay(lay_culled.Source(source["restart"], made_of, PERIOD, MARGIN, lay_culled.Floor(source["floor"])), part, copies,
-                                  lay_culled.Floor(floor), TOP)
+            laid = laid_beds.lay(Source(source["restart"], made_of, PERIOD, MARGIN, Floor(source["floor"])), part, copies, Floor(floor), TOP)
             print(f"  {name}: {laid:,} granules laid in {time.monotonic() - began:.0f} s", flush=True)
         made = {**source, "floor": floor, "sides": sides, "granules": None}
     else:

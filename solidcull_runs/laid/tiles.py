@@ -9,7 +9,7 @@ import struct
 
 import numpy as np
 
-from solidcull_runs.errors import RunError
+from ..errors import RunError
 
 # the header: a flag, then its value. Flags by what follows them (all others: an int)
 STRINGS, BIGINTS, DOUBLES = {0, 4, 22}, {5, 23, 25, 28, 31, 34}, set(range(37, 52))
@@ -18,7 +18,7 @@ FIXED = 1                         # a boundary that is not periodic, `f`
 X, TAG, IMAGE, EXTRA = 1, 4, 7, 17  # words of a granule's record; word 0 is its length, the fixes' values begin at EXTRA
 FIRST_IMAGE = 512 << 20 | 512 << 10 | 512
 NOBODY = 0                          # tag of a partner that is not there
-GRANULE = 0.0014                    # m: the largest radius
+RADIUS = 11                          # word of a granule's record
 
 
 class RestartError(RunError):
@@ -94,6 +94,9 @@ class Bed:
     """The granules of a restart file, tile by tile. `copies`: how many tiles it was laid of; (1, 1) and no margin: a periodic tile."""
 
     def __init__(self, file, copies, period, margin, roll):
+        """`period` (m): edge of a tile, or its edges along x and y; `margin` (m): from the tiles to the sides; `roll`: the middle of a
+        periodic tile becomes its corner."""
+        period = np.broadcast_to(period, 2)
         data = open(file, "rb").read()
         offset = records_offset(data)
         self.header, self.copies = without_meshes(data[:offset]), copies
@@ -105,6 +108,7 @@ class Bed:
         lengths = np.array(lengths)
         starts = np.cumsum(lengths) - lengths
         whole = words.view(np.int64)
+        self.radius = float(words[starts + RADIUS].max())
         tag = whole[starts + TAG]
         self.size, rest = divmod(len(starts), copies[0] * copies[1])
         if rest or not np.array_equal(np.sort(tag), np.arange(1, len(starts) + 1)):
@@ -112,9 +116,9 @@ class Bed:
         tile = (tag - 1) // self.size
         place = np.empty((len(starts) + 1, 2))  # by tag, from the tile's own corner
         for axis, number in enumerate((tile // copies[1], tile % copies[1])):
-            x = words[starts + X + axis] - margin - number * period
+            x = words[starts + X + axis] - margin - number * period[axis]
             if roll:
-                x = (x + period / 2) % period
+                x = (x + period[axis] / 2) % period[axis]
             words[starts + X + axis] = place[tag, axis] = x
         whole[starts + TAG] -= tile * self.size
         whole[starts + IMAGE] = FIRST_IMAGE
@@ -123,7 +127,7 @@ class Bed:
         at, owner = at[held], owner[held]
         apart = (place[tag[owner]] - place[whole[at]]) / period
         across = np.rint(apart).astype(int)  # tiles from the granule's to the partner's
-        if np.abs(apart - across).max() * period > 3 * GRANULE:
+        if (np.abs(apart - across).max(axis=0) * period > 3 * self.radius).any():
             raise RestartError(f"{file}: contact partners lie far from one another")
         whole[at] = (whole[at] - 1) % self.size + 1
         self.tiles = []
@@ -141,9 +145,11 @@ class Bed:
         return self.tiles[source(i, copies[0], self.copies[0]) * self.copies[1] + source(j, copies[1], self.copies[1])]
 
 
-def lay(source, bed, copies, period, margin, top):
+def lay(source, bed, copies, period, margin, top, beyond=None):
     """Writes the restart file `bed`: copies[0] x copies[1] tiles of the Bed `source`, between sides (the first at x = 0, y = 0)
-    that stand `margin` outside of them, under an open top. Granules are numbered tile by tile."""
+    that stand `margin` outside of them, under an open top. Granules are numbered tile by tile. `beyond` (m): how far LIGGGHTS's box
+    reaches below the floor and out of the sides."""
+    period = np.broadcast_to(period, 2)
     count = source.size * copies[0] * copies[1]
     chosen = {(i, j): source.like(i, j, copies) for i in range(copies[0]) for j in range(copies[1])}
     header = bytearray(source.header)
@@ -152,8 +158,8 @@ def lay(source, bed, copies, period, margin, top):
         struct.pack_into("i", header, where[flag], 0)
     for flag in BOUNDARY:
         struct.pack_into("i", header, where[flag], FIXED)
-    low = -2 * GRANULE
-    sides = [copies[axis] * period + 2 * margin for axis in (0, 1)]
+    low = -(2 * source.radius if beyond is None else beyond)
+    sides = [copies[axis] * period[axis] + 2 * margin for axis in (0, 1)]
     for flag, value in zip(BOX, (low, sides[0] - low, low, sides[1] - low, low, top)):
         struct.pack_into("d", header, where[flag], value)
     struct.pack_into("q", header, where[NATOMS], count)
@@ -163,8 +169,8 @@ def lay(source, bed, copies, period, margin, top):
         for (i, j), (words, starts, partners, across) in chosen.items():
             one = words.copy()
             whole = one.view(np.int64)
-            one[starts + X] += i * period + margin
-            one[starts + X + 1] += j * period + margin
+            one[starts + X] += i * period[0] + margin
+            one[starts + X + 1] += j * period[1] + margin
             whole[starts + TAG] += source.size * (i * copies[1] + j)
             tile = np.array([i, j]) + across
             there = ((tile >= 0) & (tile < copies)).all(1)

@@ -8,8 +8,8 @@ import struct
 
 import numpy as np
 
-import tiles
-from solidcull_runs.errors import RunError
+from ..errors import RunError
+from . import tiles
 
 BEGINS, ENDS = b"SDCULLB1", b"SDCULLE1"
 END = 72                                                 # bytes of a section's end
