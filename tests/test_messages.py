@@ -258,6 +258,7 @@ class KeywordRefusals(Case):
     BED = "a file name that ends with .vtp"
     LEAST = "a whole number of granules, 1 or more, behind 'least'"
     # words after `solid/cull`: keyword that is named, its value (None: missing), what to give
+    AUDIT = "two whole numbers N K: steps from one audit to the next, patches that each wakes"
     BALANCE = "a whole number of steps, 1 or more, and the largest work of a rank over the mean, more than 1"
     WRONG = {
         "every 1.5": ("every", "1.5", STEPS), "every 0": ("every", "0", STEPS), "every": ("every", None, STEPS),
