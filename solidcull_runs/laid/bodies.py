@@ -1,7 +1,7 @@
 """Solid bodies of a bed that is laid."""
 import numpy as np
 
-from .columns import (ABOUT, B_HELD, B_MASS, CHANGED, COUNT, FELT, FELT_KNOWN, FIRST, GROUNDED, GROUNDED_MASS, HIGH, LOW, QUATERNION,
+from .columns import (ABOUT, B_HELD, B_MASS, CHANGED, COUNT, FELT, FELT_KNOWN, FIRST, GROUNDED, GROUNDED_MASS, HIGH, LOW, MOTION, QUATERNION,
                       SECOND, SPIN, STEP_THEN, SUMMED, WEIGHING, WORDS)
 
 MAIN = 0                                            # the body that holds nearly all, in what is written
@@ -68,6 +68,7 @@ class Bodies:
             row[QUATERNION + 3] = 1
             row[COUNT], row[WEIGHING], row[B_HELD], row[B_MASS], row[SPIN] = count, count, held, mass, spin
             row[ABOUT:ABOUT + 3], row[FIRST:FIRST + 3] = about, first
+            row[MOTION], row[MOTION + 1:MOTION + 4] = mass, about + first / mass  # a look asks for the weight before they are settled
             row[SECOND:SECOND + 9] = second.T.reshape(-1)
             row[tail + CHANGED], row[tail + SUMMED] = 1, count
             row[tail + FELT:tail + FELT + 3] = turn @ was[tail + FELT:tail + FELT + 3]
