@@ -10,8 +10,6 @@ line and compared.
 | `logs` | what a run printed |
 | `dumps` | the files that a run left |
 | `beds` | beds and other files that are made once and kept |
-| `laid` | beds laid of copies of a smaller one, as atoms or culled |
-| `beds_on_demand` | the program [solidcull-bed](../fix_solid_cull/solidcull_bed.md) |
 | `meshes` | triangles, and STL files of them |
 | `measures` | what is measured of a run: heights of the bed, sums over all granules |
 | `twins` | runs of both kinds, one after the other or several at once, and their comparison |
@@ -46,4 +44,28 @@ The folder `validation` is what `validation/run.sh` is made of:
 | `validation.report` | the report, and what of it is kept with the sources |
 | `validation.kept_figures` | results files that are kept with the sources |
 | `validation.first_page` | rows and plot of README.md, made of those files |
+
+The folder `laid` lays beds of copies of a smaller one:
+
+| module | what it is for |
+| --- | --- |
+| `laid.tiles` | as atoms, with their contact histories |
+| `laid.beds` | culled, tile by tile |
+| `laid.sources` | the granules of the culled bed that it is laid of |
+| `laid.bodies` | the solid bodies of the bed that is laid |
+| `laid.floors` | floors that are regular grids of triangles |
+| `laid.columns` | columns of what is culled, as they stand in a restart file |
+| `laid.culled_files` | the culled part of a restart file, read and written |
+
+The folder `beds_on_demand` is the program [solidcull-bed](../fix_solid_cull/solidcull_bed.md):
+
+| module | what it is for |
+| --- | --- |
+| `beds_on_demand.command` | its options and its course |
+| `beds_on_demand.wanted` | what the user wants |
+| `beds_on_demand.material` | the user's material file |
+| `beds_on_demand.plan` | the numbers of its recipe: tiles, steps, margins |
+| `beds_on_demand.pieces` | what a bed is laid of, made once and kept |
+| `beds_on_demand.measures` | height and solid fraction |
+| `beds_on_demand.handed_over` | the files that the user gets |
 """

@@ -301,7 +301,7 @@ class Validation(Scripts):
         shutil.rmtree(few, ignore_errors=True)
         self.run_script(ROOT / "validation" / "audit" / "audit.py")
         places = sorted(f.stem[5:] for f in few.glob("then-*.dump"))
-        self.assertEqual(places, [f"{run}-{at}" for run in range(3) for at in (40, 80, 120)])
+        self.assertEqual(places, [f"{run}-{at}" for run in range(3) for at in (120, 40, 80)])
         for place in places:
             then, left, awake = (dumps.read_final(few / f"{kind}-{place}.dump") for kind in ("then", "left", "awake"))
             for granules in (left, awake):
