@@ -389,9 +389,11 @@ TEST(CommandPage, names_the_defaults_of_the_code) {
     if (w.empty() || w[0] != "depth") continue;
     expect_same(parse_settings(w), Settings());
     const std::set<std::string> named(w.begin(), w.end());
-    // a number of steps that depends on the deck, cuts that do not move, audits that do not come, and files that are not written: told in words
+    // a number of steps that depends on the deck, cuts that do not move, audits that do not come, and files that are not written:
+    // told in words
     for (const std::string& k : setting_keywords())
-      EXPECT_TRUE(named.count(k) || k == "audit" || k == "balance" || k == "every" || k == "mesh" || k == "bed") << "no default for " << k;
+      EXPECT_TRUE(named.count(k) || k == "audit" || k == "balance" || k == "every" || k == "mesh" || k == "bed")
+          << "no default for " << k;
     return;
   }
   ADD_FAILURE() << "no line of defaults that begins with depth";
