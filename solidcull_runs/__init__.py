@@ -12,6 +12,7 @@ line and compared.
 | `beds` | beds and other files that are made once and kept |
 | `meshes` | triangles, and STL files of them |
 | `measures` | what is measured of a run: heights of the bed, sums over all granules |
+| `hertz` | normal forces of contacts, of places alone |
 | `twins` | runs of both kinds, one after the other or several at once, and their comparison |
 | `comparisons` | errors beside the noise floor, and the ledger |
 | `halving` | the error of culled runs, told from runs with half the limits |

@@ -320,13 +320,13 @@ class Sequential(unittest.TestCase):
         self.assertRaises(ValueError, verdicts.in_looks, {0: 1.0, 1: 2.0}, {1: 1.0}, abs)
 
 
-class Audit(unittest.TestCase):
-    """What is kept of validation/audit, likewise; and the truth, of granules that are put in by hand."""
+class KeptPage:
+    """What is kept of the script validation/NAME/NAME.py: values, and a page that is made of them."""
 
     @classmethod
     def setUpClass(cls):
-        cls.folder = ROOT / "validation" / "audit"
-        spec = importlib.util.spec_from_file_location("validation_audit", cls.folder / "audit.py")
+        cls.folder = ROOT / "validation" / cls.NAME
+        spec = importlib.util.spec_from_file_location(f"validation_{cls.NAME}", cls.folder / f"{cls.NAME}.py")
         cls.script = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(cls.script)
         cls.records = json.loads((cls.folder / "results.json").read_text())
@@ -334,6 +334,12 @@ class Audit(unittest.TestCase):
     def test_the_page_is_made_of_the_values(self):
         text = (self.folder / "RESULTS.md").read_text()
         self.assertEqual(pages.between_marks(self.folder / "RESULTS.md", self.script.BEGIN, self.script.text_of(self.records)), text)
+
+
+class Audit(KeptPage, unittest.TestCase):
+    """As it claims; and the truth, of granules that are put in by hand."""
+
+    NAME = "audit"
 
     def test_what_is_missed_is_held(self):
         """In at least four scenes that it was not made for."""
@@ -377,20 +383,10 @@ class Audit(unittest.TestCase):
         self.assertIsNone(self.script.missing(self.granules([0] * 6, places), left, woken), "nothing sleeps")
 
 
-class Halving(unittest.TestCase):
-    """What is kept of validation/halving: the page is made of the values, and as it claims."""
+class Halving(KeptPage, unittest.TestCase):
+    """As it claims."""
 
-    @classmethod
-    def setUpClass(cls):
-        spec = importlib.util.spec_from_file_location("validation_halving", ROOT / "validation" / "halving" / "halving.py")
-        cls.script = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(cls.script)
-        cls.folder = ROOT / "validation" / "halving"
-        cls.records = json.loads((cls.folder / "results.json").read_text())
-
-    def test_the_page_is_made_of_the_values(self):
-        text = (self.folder / "RESULTS.md").read_text()
-        self.assertEqual(pages.between_marks(self.folder / "RESULTS.md", self.script.BEGIN, self.script.text_of(self.records)), text)
+    NAME = "halving"
 
     def test_true_errors_are_held(self):
         """In at least four scenes that it was not made for."""

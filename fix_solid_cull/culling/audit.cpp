@@ -249,11 +249,9 @@ void Audit::end() {
     patches[static_cast<std::size_t>(w.patch)].add(w.did);
   }
   const std::vector<AuditedPatch> of_ranks = bed_.ranks.gather(patches);
-  for (std::size_t p = 0; p < patches.size(); ++p) {
-    AuditedPatch whole;
-    for (std::size_t k = p; k < of_ranks.size(); k += patches.size()) whole.add(of_ranks[k]);
-    tally_.add(whole);
-  }
+  std::vector<AuditedPatch> whole(patches.size());
+  for (std::size_t k = 0; k < of_ranks.size(); ++k) whole[k % whole.size()].add(of_ranks[k]);
+  tally_.add(whole);
   stop();
 }
 

@@ -238,7 +238,6 @@ void Culling::collect_wakes() {
   }
 }
 
-/// Whether any does.
 Label Culling::label_with_reasons(int i) const {
   const double body = bed_.shell.labels()[i];
   if (body != 0) return {body, 0, 0};  // of what is shown between runs, too
@@ -246,6 +245,7 @@ Label Culling::label_with_reasons(int i) const {
   return {0, static_cast<double>(why.awake), static_cast<double>(why.woke)};
 }
 
+/// Whether any does.
 bool Culling::ask_for_those_that_wake() {
   bool waking = false;
   for (const int i : p_.motion.interface_atoms()) {

@@ -46,14 +46,17 @@ void AuditedPatch::add(const AuditedPatch& other) {
   load_shift += other.load_shift;
 }
 
-void AuditTally::add(const AuditedPatch& p) {
-  if (p.granules == 0) return;
-  patches_.push_back(p);
-  all_.add(p);
+void AuditTally::add(const std::vector<AuditedPatch>& patches) {
+  for (const AuditedPatch& p : patches) {
+    if (p.granules == 0) continue;
+    patches_.push_back(p);
+    all_.add(p);
+  }
+  for (int f = 0; f < figures; ++f) intervals_[static_cast<std::size_t>(f)] = interval_of(static_cast<Figure>(f));
 }
 
 /// Patches are drawn with replacement: the means that come of it (Efron 1979).
-Interval AuditTally::interval(Figure figure) const {
+Interval AuditTally::interval_of(Figure figure) const {
   if (patches_.size() < fewest) return {};
   std::mt19937_64 chance(20261127);
   std::vector<double> means;

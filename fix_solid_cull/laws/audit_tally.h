@@ -1,6 +1,7 @@
 // What audits have found: what granules that sleep would have done, had they been awake (theory.md#audit).
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -29,16 +30,20 @@ class AuditTally {
  public:
   enum Figure { moved, load_shift, energy, figures };  ///< of a granule: m, N, J
 
-  void add(const AuditedPatch& patch);
+  /// Those of an audit; patches in which nothing slept do not count.
+  void add(const std::vector<AuditedPatch>& patches);
   std::size_t patches() const { return patches_.size(); }
   const AuditedPatch& all() const { return all_; }
   /// Holds the mean of what sleeps near what is awake, in 90 of 100 cases; 0 to 0 where there are fewer than `fewest` patches.
-  Interval interval(Figure figure) const;
+  const Interval& interval(Figure figure) const { return intervals_[figure]; }
   static constexpr std::size_t fewest = 6;
 
  private:
+  Interval interval_of(Figure figure) const;
+
   std::vector<AuditedPatch> patches_;
   AuditedPatch all_;
+  std::array<Interval, figures> intervals_;  // of them
 };
 
 /// For the block at the end of a run; empty where there was no audit. `steps` that each took; mean `diameter` (m).

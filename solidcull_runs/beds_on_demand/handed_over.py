@@ -20,8 +20,8 @@ def deck(plan):
     return text
 
 
-def note(plan, facts):
-    return "".join(f"{name:32} {value}\n" for name, value in facts.items())
+def note(facts):
+    return "".join(f"{name:32} {f'{value:.6g}' if isinstance(value, float) else value}\n" for name, value in facts.items())
 
 
 def laid_bed(pieces, count, bed_floor, part, say):
@@ -65,8 +65,7 @@ def make(plan, folder, launcher, say):
     told = laid_bed(pieces, count, bed_floor, part, say) if plan.laid else poured_bed(pieces, count, bed_floor, part)
     told.update({"box (m)": f"{w.length:.12g} x {w.width:.12g}, LIGGGHTS's box {plan.top:.4g} high", "seed": w.seed,
                  "seconds": round(time.monotonic() - began)})
-    note = "".join(f"{name:32} {f'{value:.6g}' if isinstance(value, float) else value}\n" for name, value in told.items())
-    for file, text in ((w.out.with_suffix(".in"), deck(plan)), (w.out.with_suffix(".txt"), note)):
+    for file, text in ((w.out.with_suffix(".in"), deck(plan)), (w.out.with_suffix(".txt"), note(told))):
         fresh = pieces.folder / f"{file.name}.part"
         fresh.write_text(text)
         fresh.replace(file)

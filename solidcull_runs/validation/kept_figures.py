@@ -8,7 +8,7 @@ import statistics
 from pathlib import Path
 
 from ..errors import RunError
-from . import sequential, verdicts
+from . import pages, sequential, verdicts
 from .points import LIVE, SLEEP
 
 
@@ -24,6 +24,13 @@ def read(file):
 
 def text_of(records):
     return "[\n" + ",\n".join(json.dumps(r, ensure_ascii=False) for r in records) + "\n]\n"
+
+
+def keep(folder, begin, text, records):
+    """Records in results.json, and the text that is made of them in RESULTS.md, behind its line `begin`."""
+    page = pages.between_marks(folder / "RESULTS.md", begin, text)
+    pages.write(folder / "results.json", text_of(records))
+    pages.write(folder / "RESULTS.md", page)
 
 
 def figure_off(metric, verdict, unculled):

@@ -9,7 +9,6 @@ cost. `--publish` keeps the values in results.json, and RESULTS.md is made of th
 Exit: 0 as claimed (README.md), 1 not so, 2 a run failed.
 """
 import argparse
-import json
 import math
 import re
 import statistics
@@ -23,9 +22,9 @@ from scipy.spatial import cKDTree
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))
-from solidcull_runs import dumps, engine, errors, logs  # noqa: E402
+from solidcull_runs import dumps, engine, errors, hertz, logs  # noqa: E402
 from solidcull_runs.errors import RunError  # noqa: E402
-from solidcull_runs.validation import case_runs, cases, pages, short_cases  # noqa: E402
+from solidcull_runs.validation import case_runs, cases, kept_figures, pages, short_cases  # noqa: E402
 from solidcull_runs.validation.points import SLEEP, Point  # noqa: E402
 
 OUT = HERE / "out"
@@ -158,12 +157,9 @@ def places(granules):
 
 
 def loads(granules):
-    """What presses on each, as Hertz has it but for the modulus: normal forces of its contacts, summed."""
-    x, r = places(granules), granules["radius"]
-    i, j = cKDTree(x).query_pairs(2 * r.max(), output_type="ndarray").T
-    overlap = np.maximum(0, r[i] + r[j] - np.linalg.norm(x[i] - x[j], axis=1))
-    force = np.sqrt(r[i] * r[j] / (r[i] + r[j])) * overlap**1.5
-    return np.bincount(i, force, len(x)) + np.bincount(j, force, len(x))
+    """What presses on each, but for the modulus: normal forces of its contacts, summed."""
+    pairs, force = hertz.contacts(granules)
+    return sum(np.bincount(end, force, len(granules)) for end in pairs.T)
 
 
 def missing(then, left, woken):
@@ -272,14 +268,12 @@ def main(argv=None):
         return 0
     if a.publish and (HERE / "results.json").exists():
         ran = {r["scene"] for r in records}
-        records += [r for r in json.loads((HERE / "results.json").read_text()) if r["scene"] not in ran]
+        records += [r for r in kept_figures.read(HERE / "results.json") if r["scene"] not in ran]
         records.sort(key=lambda r: (TUNED + HELD_OUT).index(r["scene"]))
     text = text_of(records)
     print(text)
     if a.publish:
-        page = pages.between_marks(HERE / "RESULTS.md", BEGIN, text)
-        pages.write(HERE / "results.json", "[\n" + ",\n".join(map(json.dumps, records)) + "\n]\n")
-        pages.write(HERE / "RESULTS.md", page)
+        kept_figures.keep(HERE, BEGIN, text, records)
     held_out = compared(records, HELD_OUT)
     return 0 if not held_out or as_claimed(held_out)[2] else 1
 

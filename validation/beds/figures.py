@@ -1,8 +1,8 @@
 """What is compared of a bed: figures by name, of its granules' places alone. At rest a normal contact force is Hertz's of the overlap.
 All but the floor's share and the coordination number of all are such that the size of the box does not matter."""
 import numpy as np
-from scipy.spatial import cKDTree
 
+from solidcull_runs import hertz
 from solidcull_runs.beds_on_demand import measures
 
 YOUNG, POISSON = 5e6, 0.3    # Pa; of material.in
@@ -13,34 +13,18 @@ LAYER = 2.0                  # mean diameters: how far from a side a granule cou
 SHARES = (10, 50, 90, 99)    # % of contacts that bear less
 
 
-def hertz(radius, overlap):
-    """Normal force (N)."""
-    overlap = np.maximum(overlap, 0)
-    return 4 / 3 * STIFF * np.sqrt(radius * overlap) * overlap
-
-
-def contacts(bed):
-    """Both granules of each contact, and its normal force (N)."""
-    place = np.column_stack([bed[c] for c in "xyz"])
-    pairs = cKDTree(place).query_pairs(2.05 * bed["radius"].max(), output_type="ndarray")
-    one, other = bed["radius"][pairs[:, 0]], bed["radius"][pairs[:, 1]]
-    overlap = one + other - np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1)
-    touch = overlap > 0
-    return pairs[touch], hertz((one * other / (one + other))[touch], overlap[touch])
-
-
 def on_sides(bed, sides):
     """Heights and normal forces of what presses on the four sides."""
     heights, forces = [], []
     for axis, side in zip("xy", sides):
         for distance in (bed[axis], side - bed[axis]):
             heights.append(bed["z"])
-            forces.append(hertz(bed["radius"], bed["radius"] - distance))
+            forces.append(hertz.force(bed["radius"], bed["radius"] - distance, STIFF))
     return np.concatenate(heights), np.concatenate(forces)
 
 
 def floor_load(bed):
-    return float(hertz(bed["radius"], bed["radius"] - bed["z"]).sum())
+    return float(hertz.force(bed["radius"], bed["radius"] - bed["z"], STIFF).sum())
 
 
 def figures(bed, sides, depth, gravity, margin):
@@ -58,7 +42,7 @@ def figures(bed, sides, depth, gravity, margin):
     low = near & (bed["z"] < 0.8 * depth)
     found["solid fraction near the sides"] = float((4 / 3 * np.pi * bed["radius"][low]**3).sum() / ((area - inner[0] * inner[1]) * 0.8 * depth))
     found["height of the surface"] = measures.height(bed, sides, d)
-    pairs, force = contacts(bed)
+    pairs, force = hertz.contacts(bed, STIFF)
     found["coordination number"] = 2 * len(pairs) / len(bed)
     touches = np.bincount(pairs.ravel(), minlength=len(bed))
     found["coordination number near the sides"] = float(touches[near].mean())

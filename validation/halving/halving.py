@@ -9,7 +9,6 @@ are not made again. `--publish` keeps the values in results.json, and RESULTS.md
 Exit: 0 as claimed (README.md), 1 not so, 2 a run failed.
 """
 import argparse
-import json
 import math
 import statistics
 import sys
@@ -20,7 +19,7 @@ from scipy import stats
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))
 from solidcull_runs import decks, engine, errors, halving  # noqa: E402
-from solidcull_runs.validation import case_runs, cases, pages, short_cases  # noqa: E402
+from solidcull_runs.validation import case_runs, cases, kept_figures, pages, short_cases  # noqa: E402
 from solidcull_runs.validation.points import SLEEP, UNCULLED, Point  # noqa: E402
 
 OUT = HERE / "out"
@@ -170,9 +169,7 @@ def main(argv=None):
     text = text_of(records)
     print(text)
     if a.publish:
-        page = pages.between_marks(HERE / "RESULTS.md", BEGIN, text)
-        pages.write(HERE / "results.json", "[\n" + ",\n".join(map(json.dumps, records)) + "\n]\n")
-        pages.write(HERE / "RESULTS.md", page)
+        kept_figures.keep(HERE, BEGIN, text, records)
     held_out = compared(records, HELD_OUT)
     return 0 if not held_out or as_claimed(held_out)[2] else 1
 
