@@ -90,7 +90,10 @@ class Cases(Folder):
         self.refused("needs a metric, a unit, a margin (2 % or a number) and why", self.case, README.replace("0.5", "some"))
         self.refused("needs a metric, a unit, a margin (2 % or a number) and why", self.case, README.replace("said so", ""))
         self.refused("case.py has no 'measure'", self.case, README, CASE.replace("measure", "measures"))
-        self.refused("case.py has no 'quick'", self.case, README, CASE.replace("quick = ", ""))
+        self.refused("case mine: case.py has none of quick, full, production", self.case, README, CASE.replace("quick = full = ", "size = "))
+        self.case(README, CASE.replace("quick = ", ""))
+        self.assertEqual([cases.load([], size, self.folder / "cases") == [] for size in cases.SIZES], [True, False, True])
+        self.refused("case mine has no size quick; these have: none", cases.load, ["mine"], "quick", self.folder / "cases")
         self.refused("case.py cannot be read: NameError", self.case, README, CASE + "nothing\n")
         self.refused("curves of depths, which the README's table does not name", self.case, README, CASE.replace('{"depth": "v', '{"depths": "v'))
         self.refused("no case 'other'; there is: mine", cases.load, ["other"], "quick", self.folder / "cases")
@@ -105,7 +108,7 @@ class Cases(Folder):
     def test_every_case_of_the_project_can_be_read(self):
         there = cases.names()
         self.assertGreaterEqual(len(there), 1)
-        for size in ("quick", "full"):
+        for size in cases.SIZES:
             for case in cases.load([], size):
                 with self.subTest(f"{case.name} {size}"):
                     self.assertGreater(case.granules(case.main_scene), 0)
@@ -121,6 +124,12 @@ class Points(Folder):
         self.assertEqual(points.runs_of(found[0]), 5)
         self.assertEqual({p.family for p in points.points(["depth 1"])}, set(points.FAMILIES))
         self.assertEqual([p.name for p in found if p.default], ["unculled", "sleep 3 0", "live 3 0"])
+
+    def test_production_is_one_scene_at_the_defaults(self):
+        case = cases.Case(cases.CASES / "slow_impact", cases.PRODUCTION)
+        self.assertEqual((list(case.scenes), case.granules(case.main_scene)), (["4000 kg/m3 from 0.1 m"], 160001))
+        jobs = case_runs.jobs_of(case, self.folder, {(case.name, case.main_scene): None}, "launcher", "fix")
+        self.assertEqual({(job.point.family, job.k) for job in jobs}, {(family, k) for family in ("unculled", "sleep", "live") for k in range(5)})
 
     def test_on_more_ranks_the_defaults_alone_are_run(self):
         case = cases.load(["drum"], "quick")[0]
@@ -552,9 +561,17 @@ class Publish(Folder):
         names = [case for case, _ in first_page.ROWS if case] + ["impact"]
         return [{**case_results.read_result(STORED), "case": name, **of_a_case} for name in names]
 
-    def published(self, results, root):
+    def published(self, results, root, *size):
         page = report.write(results, self.folder / "report", None, "From a test.")
-        report.publish(results, page, self.folder / "report", root)
+        report.publish(results, page, self.folder / "report", root, *size)
+
+    def test_production_has_a_page_of_its_own(self):
+        root = self.root()
+        readme = (root / "README.md").read_text()
+        self.published(self.results(), root, cases.PRODUCTION)
+        self.assertEqual({f.name for f in (root / "validation" / "production").iterdir()}, {"RESULTS.md", "results.json", "all.png"})
+        self.assertEqual((root / "README.md").read_text(), readme)
+        self.assertFalse((root / first_page.CASES).exists())
 
     def test_results_file_and_pages(self):
         results, root = self.results(), self.root()
@@ -662,10 +679,11 @@ class Publish(Folder):
 
     def test_only_full_runs_of_all_cases_are_published(self):
         for words in (["--publish"], ["--publish", "--full", "silo"], ["--publish", "--full", "--also", "calm 3"],
-                      ["--publish", "--full", "--ranks", "2"], ["--few-steps", "--ranks", "2"], ["--ranks", "0"]):
+                      ["--publish", "--full", "--ranks", "2"], ["--publish", "--production", "silo"], ["--few-steps", "--ranks", "2"], ["--ranks", "0"]):
             with self.assertRaises(SystemExit), open(os.devnull, "w") as nowhere, contextlib.redirect_stderr(nowhere):
                 command.options(words)
-        self.assertTrue(command.options(["--publish", "--full"]).publish)
+        for size in ("--full", "--production"):
+            self.assertTrue(command.options(["--publish", size]).publish)
 
 
 class Command(Folder):

@@ -10,6 +10,7 @@ from ..dumps import snapshots
 from ..errors import RunError
 from ..logs import loops
 from . import fields
+from .cases import PRODUCTION
 from .points import ALSO, BY_HAND, PAPER, UNCULLED
 
 MOVED = 1e-2  # mean diameters between two snapshots: what moves
@@ -96,7 +97,7 @@ def result_of(case, done, decided=False):
             mean = statistics.fmean(counts) if counts else 0
             result["bound"] = {"every": framed.frames, "moving": mean, "N/N_moving": case.granules(case.main_scene) / mean if mean else None}
     laws = case.get("laws")
-    if laws:
+    if laws and case.size != PRODUCTION:
         result["laws"] = laws_of(case, result, laws)
     return result
 

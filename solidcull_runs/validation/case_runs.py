@@ -10,7 +10,7 @@ from ..engine import POLL, stop_all
 from ..errors import RunError
 from ..logs import FROM_HERE
 from ..twins import KeptJob
-from .cases import short_hash
+from .cases import PRODUCTION, short_hash
 from .points import BY_HAND, PAPER, UNCULLED, points, runs_of
 
 ASIDE = [k * 1e-5 for k in (0, *(side * n for n in range(1, 16) for side in (1, -1)))][:30]  # m: the place of a tool, ball or wall in each run
@@ -165,7 +165,7 @@ def jobs_of(case, out, beds, launcher, fix, also=(), ranks=1):
     for scene in case.scenes:
         main = scene == case.main_scene
         left_out = {family for family, there in ((BY_HAND, case.get("by_hand")), (PAPER, case.get("paper", True))) if not there}
-        wanted = [p for p in points(also) if (p.everywhere or main) and p.family not in left_out and (ranks == 1 or p.everywhere)]
+        wanted = [p for p in points(also) if (p.everywhere or (main and case.size != PRODUCTION)) and p.family not in left_out and (ranks == 1 or p.everywhere)]
         jobs += maker.jobs(scene, [(p, k) for k in range(max(runs_of(p, main) for p in wanted)) for p in wanted if k < runs_of(p, main)])
     return jobs
 

@@ -5,10 +5,10 @@ case.py holds, as plain names:
 | name | what |
 | --- | --- |
 | `deck` | file of the deck, with one `fix ID group solid/cull` line without keywords |
-| `quick`, `full` | variables of the deck (and of the bed), by size; `granules` is how many there are at the end |
+| `quick`, `full`, `production` | variables of the deck (and of the bed), by size, of which a case has one or more; `granules` is how many there are at the end |
 | `bed` | optional: the deck that settles the bed and writes ${restart}; another folder's may be named |
 | `bed_uses` | optional: the variables of the bed, all of the size if not said |
-| `scenes` | optional: name -> more variables. The first is swept over all points, the others are run at the defaults only. Or: size -> such scenes |
+| `scenes` | optional: name -> more variables. The first is swept over all points, the others are run at the defaults only, and not in production. Or: size -> such scenes |
 | `files(folder, v)` | optional: writes meshes and the like for the variables v; the deck finds the folder as ${files} |
 | `aside` | the variable that moves the tool, ball or wall by 10 um from run to run |
 | `by_hand` | optional: a region (style and arguments; the deck's variables) in which granules stay free when the rest is frozen by hand |
@@ -23,6 +23,7 @@ a number in the metric's unit. They are fixed before the case is run.
 """
 import hashlib
 import importlib.util
+import itertools
 import json
 import re
 from dataclasses import dataclass
@@ -32,6 +33,7 @@ from ..engine import ROOT
 from ..errors import RunError
 
 CASES = ROOT / "validation" / "cases"
+QUICK, FULL, PRODUCTION = SIZES = ("quick", "full", "production")
 
 
 @dataclass(frozen=True)
@@ -94,9 +96,12 @@ class Case:
         self.metrics = metrics_of(readme, self.folder / "README.md")
         self.given = self.read()
         scenes = self.get("scenes", {"": {}})
-        self.scenes = scenes.get(size, scenes)
+        scenes = scenes.get(size, scenes)
+        self.scenes = dict(itertools.islice(scenes.items(), 1)) if size == PRODUCTION else scenes
         self.deck = self.folder / self.need("deck")
-        self.sized = dict(self.need(size))
+        if not any(hasattr(self.given, name) for name in SIZES):
+            raise RunError(f"case {self.name}: case.py has none of {', '.join(SIZES)}")
+        self.sized = dict(self.get(size, {}))
         self.need("measure")
         if not self.deck.is_file():
             raise RunError(f"case {self.name}: there is no deck {self.deck.name}")
@@ -120,6 +125,11 @@ class Case:
         if not hasattr(self.given, name):
             raise RunError(f"case {self.name}: case.py has no '{name}'")
         return getattr(self.given, name)
+
+    @property
+    def is_there(self):
+        """Whether it has this size."""
+        return hasattr(self.given, self.size)
 
     @property
     def main_scene(self):
@@ -166,9 +176,13 @@ def names(root=CASES):
 
 
 def load(wanted, size, root=CASES):
-    """The cases that are wanted by name, all if none is."""
+    """The cases that are wanted by name, all of this size if none is."""
     there = names(root)
     unknown = [name for name in wanted if name not in there]
     if unknown:
         raise RunError(f"no case '{unknown[0]}'; there is: {', '.join(there)}")
-    return [Case(Path(root) / name, size) for name in (wanted or there)]
+    found = [Case(Path(root) / name, size) for name in (wanted or there)]
+    for case in found if wanted else ():
+        if not case.is_there:
+            raise RunError(f"case {case.name} has no size {size}; these have: {', '.join(c.name for c in load([], size, root)) or 'none'}")
+    return [case for case in found if case.is_there]

@@ -1,4 +1,4 @@
-"""validation/run.sh [--quick|--full] [--decide|--no-decide] [--report-only|--few-steps] [--keep] [--publish] [--also KEYWORDS] [--ranks N] [--at-once N] [CASE ...]
+"""validation/run.sh [--quick|--full|--production] [--decide|--no-decide] [--report-only|--few-steps] [--keep] [--publish] [--also KEYWORDS] [--ranks N] [--at-once N] [CASE ...]
 
 Runs cases, unculled and culled, and writes the report. `--decide`, a part of `--full`: pairs of runs are added until each metric is
 equivalent or outside, 30 at most. What was run before, with the same deck and the same fix, is not run again:
@@ -27,6 +27,8 @@ def options(argv):
     size = p.add_mutually_exclusive_group()
     size.add_argument("--quick", action="store_const", dest="size", const="quick", help="about 6,000 granules a case (default)")
     size.add_argument("--full", action="store_const", dest="size", const="full", help="20,000 granules a case and more: hours")
+    size.add_argument("--production", action="store_const", dest="size", const="production",
+                      help="160,000 granules and more, of the cases that have this size, at the defaults: a day")
     how = p.add_mutually_exclusive_group()
     how.add_argument("--report-only", action="store_true", help="run nothing; write the report of the results that there are")
     how.add_argument("--few-steps", action="store_true", help="each deck for a few steps: that all of it still runs")
@@ -39,11 +41,11 @@ def options(argv):
     p.add_argument("--report", type=Path, default=None, metavar="FOLDER", help="default: validation/report/SIZE")
     p.add_argument("--keep", action="store_true", help="keep the results of each case with the sources, for reports of cases that were run elsewhere")
     p.add_argument("--kept", type=Path, default=HERE / "kept", metavar="FOLDER", help="where they are kept (default: validation/kept)")
-    p.add_argument("--publish", action="store_true", help="keep the report with the sources: validation/RESULTS.md, results.json, and the README's rows")
+    p.add_argument("--publish", action="store_true", help="keep the report with the sources: RESULTS.md and results.json in validation/, and the README's rows; of --production in validation/production/")
     p.set_defaults(size="quick")
     a = p.parse_args(argv)
-    if a.publish and (a.few_steps or a.case or a.also or a.ranks != 1 or a.size != "full"):
-        p.error("--publish takes all cases, --full, and neither --few-steps nor --also nor --ranks")
+    if a.publish and (a.few_steps or a.case or a.also or a.ranks != 1 or a.size not in report.PUBLISHED):
+        p.error("--publish takes all cases, --full or --production, and neither --few-steps nor --also nor --ranks")
     if a.ranks < 1 or (a.few_steps and a.ranks != 1):
         p.error("--ranks takes 1 or more, and not with --few-steps")
     if a.decide is None:
@@ -127,7 +129,7 @@ def run(a):
     page = report.write(results, folder, out, f"Made by `validation/run.sh --{a.size}{said(a)}{f' --ranks {a.ranks}' if a.ranks > 1 else ''}`.")
     say(f"report: {folder / 'README.md'} and {folder / 'report.html'}")
     if a.publish:
-        report.publish(results, page, folder, HERE.parent)
+        report.publish(results, page, folder, HERE.parent, a.size)
     return told(failed) or int(any(r["lost"] for r in results))
 
 

@@ -6,10 +6,12 @@ from pathlib import Path
 
 from ..errors import RunError
 from . import first_page, kept_figures, pages, report_plots, sequential, verdicts
+from .cases import FULL, PRODUCTION
 from .points import BY_HAND, LIVE, PAPER, SLEEP
 
 BEGIN = "<!-- made by validation/run.sh --publish -->"
 PICTURES = ("all.png",)  # of the overview, kept with the sources
+PUBLISHED = {FULL: "validation", PRODUCTION: "validation/production"}  # where
 
 
 def figure_of(value):
@@ -206,19 +208,22 @@ def of_one_case(result):
     return page.markdown()
 
 
-def publish(results, page, report_folder, root):
-    """Writes results.json and RESULTS.md beside validation/run.sh, the README's table and the impact's; all or none."""
+def publish(results, page, report_folder, root, size=FULL):
+    """Writes results.json and RESULTS.md where those of the size are kept, and of FULL the README's table and the impact's; all or none."""
     for result in results:
         if not verdicts.judge(result):
             raise RunError(f"{result['case']} has too few runs to publish; run it to its end first")
     records = [record for result in results for record in kept_figures.records_of(result)]
-    texts = {root / "README.md": first_page.readme(root, records, kept_figures.read(root / first_page.SCALE)),
-             root / first_page.CASES: kept_figures.text_of(records), root / "validation" / "RESULTS.md": page.markdown(PICTURES)}
+    folder = root / PUBLISHED[size]
+    texts = {folder / "results.json": kept_figures.text_of(records), folder / "RESULTS.md": page.markdown(PICTURES)}
+    if size == FULL:
+        texts[root / "README.md"] = first_page.readme(root, records, kept_figures.read(root / first_page.SCALE))
     impact = next((r for r in results if r["case"] == "impact"), None)
-    if impact:
+    if impact and size == FULL:
         file = root / "examples" / "impact" / "RESULTS.md"
         texts[file] = pages.between_marks(file, BEGIN, of_one_case(impact))
+    folder.mkdir(parents=True, exist_ok=True)
     for file, text in texts.items():
         pages.write(file, text)
     for name in PICTURES:
-        shutil.copyfile(report_folder / name, root / "validation" / name)
+        shutil.copyfile(report_folder / name, folder / name)

@@ -68,7 +68,7 @@ Bed bed(const std::string& name, const std::string& contact, bool mesh = false, 
   b.contact = contact;
   b.mesh_walls = mesh;
   b.cohesion = cohesion;
-  if (contact.find("hooke") != std::string::npos) b.dt = 1e-5;  // stiffer at low speed: 3e-5 s would shake the bed
+  if (contact.find("hooke") != std::string::npos) b.dt = 2e-5;  // stiffer at low speed: 3e-5 s would shake the bed
   return b;
 }
 

@@ -10,6 +10,7 @@ quick = {**grains, "granules": 3200, "bed_granules": 3200, "L": 0.28, "W": 0.12,
          "path": 0.06, "speed": 0.2, "plunge": 0.2}
 full = {**grains, "granules": 20000, "bed_granules": 20000, "L": 0.5, "W": 0.3, "wide": 0.08, "start": 0.13,
         "path": 0.08, "speed": 0.2, "plunge": 0.2}
+production = {**full, "granules": 160000, "bed_granules": 160000, "L": 1.41, "W": 0.85, "start": 0.65}
 scenes = {"35 mm": {}, "25 mm": {"depth": 0.025}, "50 mm": {"depth": 0.05}}
 aside = "aside"
 by_hand = "block $(v_start-0.05) $(v_start+v_path+0.1) INF INF $(v_surface-v_depth-0.025) INF"

@@ -5,8 +5,10 @@ deck, bed = "../../../examples/clumps/strike.in", "../../../examples/clumps/sett
 bed_uses = ("clumps", "L", "wide")
 quick = {"granules": 6001, "clumps": 2000, "L": 0.04, "wide": 0.0425, "steps": 4000}  # granules: spheres, and the ball
 full = {"granules": 21001, "clumps": 7000, "L": 0.06, "wide": 0.0625}
+production = {"granules": 160003, "clumps": 53334, "L": 0.139, "wide": 0.1415, "frames": 400}
 scenes = {"quick": {"2,000 clumps": {}},
-          "full": {"7,000 clumps": {}, "20,000 clumps": {"granules": 60001, "clumps": 20000, "L": 0.085, "wide": 0.0875}}}
+          "full": {"7,000 clumps": {}, "20,000 clumps": {"granules": 60001, "clumps": 20000, "L": 0.085, "wide": 0.0875}},
+          "production": {"53,334 clumps": {}}}
 aside = "dx"
 paper = False  # it keeps no clumps
 curves = {"largest depth": "v_depth", "mean kinetic energy": "v_bedke", "peak load on the floor": "v_floor"}

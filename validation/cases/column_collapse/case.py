@@ -8,9 +8,11 @@ bed_uses = ("bed_granules", "L", "W", "room", "small", "large", "dt", "low", "hi
 grains = {"small": 0.0048, "large": 0.0056, "dt": 1e-4, "skin": 0.002, "low": -0.01, "high": 1.6, "pour": 0.4, "damp": 0.4, "free": 0.2}
 quick = {**grains, "granules": 3000, "bed_granules": 3000, "W": 0.08, "room": 0.8, "steps": 6000}
 full = {**grains, "granules": 20000, "bed_granules": 20000, "W": 0.15, "room": 1.5, "steps": 7500, "pour": 0.6}
+production = {**full, "granules": 160000, "bed_granules": 160000, "W": 0.3, "room": 3.0, "steps": 10600, "high": 3.2, "pour": 0.85, "damp": 0.5, "frames": 400}
 # its length L goes with the aspect ratio
 scenes = {"quick": {"a = 1": {"L": 0.192}, "a = 0.5": {"L": 0.272}, "a = 2": {"L": 0.136}},
-          "full": {"a = 1": {"L": 0.362}, "a = 0.5": {"L": 0.512}, "a = 2": {"L": 0.256}}}
+          "full": {"a = 1": {"L": 0.362}, "a = 0.5": {"L": 0.512}, "a = 2": {"L": 0.256}},
+          "production": {"a = 1": {"L": 0.724}}}
 aside = "aside"
 # above a plane of 30 degrees, about the final slope, through the gate's foot
 by_hand = "plane $L 0 0 0.5 0 0.866"

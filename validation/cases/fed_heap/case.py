@@ -10,6 +10,7 @@ quick = {**grains, "granules": 4000, "bed_granules": 3600, "fed": 400, "rate": 1
          "L": 0.7, "W": 0.7, "foot": 0.15, "tall": 0.31, "high": 0.4, "sink": 7000, "feed": 3500, "rest": 1000}
 full = {**grains, "granules": 100000, "bed_granules": 97600, "fed": 2400, "rate": 12000, "spout": 0.08,
         "L": 2.0, "W": 2.0, "foot": 0.45, "tall": 0.93, "high": 1.0, "sink": 12000, "feed": 2000, "rest": 500}
+production = {**full, "granules": 320000, "bed_granules": 317600, "L": 2.9, "W": 2.9, "foot": 0.665, "tall": 1.38, "high": 1.45, "sink": 15000}
 aside = "aside"
 picture = ("y", 0.5, 1)
 D, CELL = 0.0104, 0.004  # m: a granule; of the height map

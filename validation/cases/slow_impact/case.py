@@ -5,9 +5,10 @@ import numpy as np
 
 from solidcull_runs import measures, meshes
 
-deck, bed, bed_uses = "impact.in", "../../shared/pour.in", ("bed_granules", "L", "W")
+deck, bed, bed_uses = "impact.in", "../../shared/pour.in", ("bed_granules", "L", "W", "high", "pour", "damp")
 quick = {"granules": 6001, "bed_granules": 6000, "L": 0.05, "W": 0.05, "steps": 2800}
 full = {"granules": 20001, "bed_granules": 20000, "L": 0.075, "W": 0.075, "steps": 6000}
+production = {"granules": 160001, "bed_granules": 160000, "L": 0.15, "W": 0.15, "high": 0.4, "pour": 0.25, "damp": 0.3, "steps": 6000, "frames": 400}
 scenes = {"4000 kg/m3 from 0.1 m": {}, "15000 kg/m3": {"rho": 15000}, "from 0.2 m": {"drop": 0.2}}
 aside = "aside"
 by_hand = "sphere $(v_L/2) $(v_W/2) ${top} $(0.4*v_L)"
