@@ -39,6 +39,7 @@ The folder `validation` is what `validation/run.sh` is made of:
 | `validation.verdicts` | two one-sided tests on pairs of runs, and what they say of a case |
 | `validation.sequential` | how far a mean may lie from what pairs of runs show, where pairs are added |
 | `validation.deciding` | which pairs of runs a case still lacks for its verdicts |
+| `validation.forecasts` | what the fix forecast of runs, beside what came |
 | `validation.slices` | a picture of what moves, in a slice of the bed |
 | `validation.report_plots` | plots of the report |
 | `validation.pages` | text, tables and pictures as Markdown and HTML |

@@ -26,8 +26,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT))
 from solidcull_runs import logs  # noqa: E402
-from solidcull_runs.validation import (case_results, case_runs, cases, command, deciding, fields, first_page, kept_figures, pages, points,  # noqa: E402
-                                       report, sequential, short_cases, verdicts)
+from solidcull_runs.validation import (case_results, case_runs, cases, command, deciding, fields, first_page, forecasts, kept_figures, pages,  # noqa: E402
+                                       points, report, sequential, short_cases, verdicts)
 from solidcull_runs.errors import RunError  # noqa: E402
 
 STORED = ROOT / "tests" / "data" / "validation_result.json"
@@ -529,6 +529,28 @@ class Report(Folder):
         self.assertEqual(verdicts.judge(result), {})
         report.write([result], self.folder / "report")
         self.assertIn("There are too few runs to judge.", (self.folder / "report" / "README.md").read_text())
+
+    def test_forecasts_beside_what_came(self):
+        """Of the longest loop that has one; a run without is left out."""
+        result = self.stored()
+        scene = verdicts.main_scene(result)
+
+        def loops(name, *of_runs):
+            for run, seconds in zip(scene["points"][name]["runs"], of_runs):
+                run["loops"] = [{"seconds": s, "forecast": f, "told": None} for s, f in seconds]
+        loops("unculled", [(1, None), (40, None), (90, None)], [(1, None), (44, None), (90, None)])
+        loops("sleep 3 0", [(1, 9.0), (20, 2.5), (30, None)], [(1, 9.0), (22, 2.9), (30, None)], [(1, None), (21, None), (30, None)])
+        loops("live 3 0", [(1, 1.5), (42, None), (90, None)])
+        made = forecasts.forecasts_of(result)
+        self.assertEqual([(f.mode, f.said, f.came, f.is_near) for f in made], [("sleep", 2.7, 2.0, False), ("live", 1.5, 1.0, False)])
+        report.write([result], self.folder / "report")
+        page = (self.folder / "report" / "README.md").read_text()
+        self.assertIn("Of 2 forecasts 0 are within 30 %", page)
+        self.assertIn("| `sleep` | 2.70 | 2.00 | **1.35** |", page)
+        for run in scene["points"]["sleep 3 0"]["runs"][:2]:
+            run["loops"][1]["seconds"] = 18
+        self.assertTrue(forecasts.forecasts_of(result)[0].is_near)
+        self.assertEqual(forecasts.forecasts_of(self.stored()), [], "results of runs that were not asked")
 
     def test_wrong_files(self):
         file = self.folder / "results.json"
