@@ -55,6 +55,7 @@ The folder `laid` lays beds of copies of a smaller one:
 | `laid.beds` | culled, tile by tile |
 | `laid.sources` | the granules of the culled bed that it is laid of |
 | `laid.bodies` | the solid bodies of the bed that is laid |
+| `laid.walls` | the number by which a restart file knows the walls of a deck |
 | `laid.floors` | floors that are regular grids of triangles |
 | `laid.columns` | columns of what is culled, as they stand in a restart file |
 | `laid.culled_files` | the culled part of a restart file, read and written |

@@ -43,6 +43,7 @@ std::uint64_t ChunkShares::body_number(int rank, std::uint64_t body) {
     share.begins = true;
     share.part.head = part_.head;
     share.part.layouts = part_.layouts;
+    share.part.meshes = part_.meshes;
     known.begun = true;
   }
   int& number = known.bodies[static_cast<std::int64_t>(body)];
@@ -78,6 +79,11 @@ std::map<int, ChunkShare> ChunkShares::shares(const std::vector<int>& atoms_on) 
       share_granule(table.row(r), table.columns, rank, tables.back());
     }
   share_contacts();
+  for (std::size_t r = 0; r < chunk_.wall_loads.rows; ++r) {
+    const std::uint64_t* const row = chunk_.wall_loads.row(r);
+    if (const int* rank = rank_of_.find(static_cast<std::int64_t>(row[load_tag])))
+      append_row(row, chunk_.wall_loads.columns, shares_[*rank].granules.wall_loads);
+  }
   return std::move(shares_);
 }
 

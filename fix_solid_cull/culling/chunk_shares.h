@@ -22,7 +22,7 @@ struct ChunkShare {
 /// chunk. A body goes once to each rank that gets granules of it, where it is known by the order in which bodies came. Local.
 class ChunkShares {
  public:
-  explicit ChunkShares(const Bed& bed) : bed_(bed), reader_(bed) {}
+  explicit ChunkShares(const Bed& bed) : bed_(bed), reader_(bed, false) {}
 
   /// A chunk of kind `part`; those that follow are of it.
   void begin(const SectionChunk& part);

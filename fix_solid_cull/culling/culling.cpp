@@ -48,6 +48,10 @@ void Culling::begin_run() {
   for (int d = 0; d < 3; ++d)
     if (!bed_.run.periodic[d]) periods[d] = 0;
   bed_.solid.set_periods(periods);
+  if (p_.snapshot.waits() || bed_.census.something_stored()) {
+    const std::vector<double>& largest = bed_.solid.largest_radius_by_type();
+    bed_.memory.expect_stored(*std::max_element(largest.begin(), largest.end()));
+  }
   p_.report.membership_changed();  // the deck may have made granules, or deleted some
   p_.files.begin_run();
   phase_ = Phase::beginning;
@@ -106,6 +110,7 @@ void Culling::set_up_atoms() {
   bed_.ranks.expect_far_out(true);  // the deck may have moved anything anywhere
   if (p_.snapshot.waits()) {
     p_.snapshot.take_up();
+    if (p_.snapshot.walls_are_as_they_were()) p_.walls.remember_walls();
     change_.count_restored();
     // this deck may hold or drive what the one before did not
     p_.exchange.set_stored_groups(p_.claims.wake_claimed());
@@ -142,6 +147,7 @@ void Culling::initial_step() {
   p_.forecaster.begin_run();
   p_.audit.begin_run();
   take_loads();
+  if (p_.snapshot.take_taken_up()) p_.grounding.share_out_loads();
   p_.gravity.begin_run();
   look_.see_walls(true);
   open_for_insertion(bed_.run.step);

@@ -264,6 +264,7 @@ void Parcels::take_as_it_was(const Parcel& p) {
       contacts.add(e.low == g.tag ? e.high : e.low, history, partner);
     }
     bed_.solid.add_stored(s, g.record, g.length, contacts);
+    bed_.solid.add_wall_loads(g.tag, body, g.wall_loads);
   }
   for (const Parcel::Edge* e : of_others) bed_.solid.freeze_in_frame(e->low, e->high, e->history);
 }

@@ -26,7 +26,7 @@ struct Parcel {
   struct Granule : StoredGranule {
     const double* record = nullptr;  ///< of an interior granule; none of an interface granule
     int length = 0;
-    std::vector<WallLoad> wall_loads;  ///< of an interior granule that was put away at walls; none out of a file
+    std::vector<WallLoad> wall_loads;  ///< of an interior granule that was put away at walls
   };
   struct Edge {
     std::int64_t low, high;

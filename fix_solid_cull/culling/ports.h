@@ -266,6 +266,11 @@ class Walls {
   virtual std::vector<std::string> names() const = 0;  ///< sorted: to see that one has gone
   /// Numbers that are others if a wall that stands still was made, taken away, moved or changed since; between runs. Local.
   virtual std::vector<double> fingerprint() const = 0;
+  /// This rank's part of a sum over ranks that says the same of walls that stand still on any number of ranks, and in another
+  /// process: another one if a wall is elsewhere, moves, or is of other material, or if there are others.
+  virtual std::uint64_t part_of_sum() const = 0;
+  /// Of the meshes that report their load, by WallLoad::mesh.
+  virtual const std::vector<std::string>& mesh_names() const = 0;
   /// What still elements of meshes that report their load did to the granule in this step.
   virtual std::vector<WallLoad> loads_on(std::int64_t tag) = 0;
   /// A mesh element bears this in addition (N, N m about the mesh's point of reference), in this step.
@@ -471,6 +476,8 @@ class Memory {
   virtual void fit() = 0;                       ///< cuts them. While membership changes, not at the start of a run
   virtual void fit_bins(bool some_stored) = 0;  ///< likewise: wider search bins where few atoms are left
   virtual void give_bins_back() = 0;
+  /// A run begins with stored granules, the largest of this radius (m): likewise, before the engine makes its bins.
+  virtual void expect_stored(double largest_radius) = 0;
 };
 
 struct Ports {

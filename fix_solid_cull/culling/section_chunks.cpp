@@ -4,6 +4,7 @@
 #include <cstring>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "bits.h"
 #include "store_exchange.h"
@@ -19,6 +20,7 @@ std::uint64_t whole(std::int64_t x) { return static_cast<std::uint64_t>(x); }
 enum PartColumn { own_lo = 0, own_hi = 3, observer = 6, observed_then = 13, places_lo = 20, places_hi = 23, part_columns = 26 };
 enum ContactColumn { c_low, c_high, c_body, c_known, c_history };
 enum GranuleColumn { g_tag, g_body, g_numbers };
+using namespace chunk_columns;
 static_assert(int{c_history} == chunk_columns::history, "the same columns");
 
 std::uint64_t word(double x) { return bits_of(x); }
@@ -49,6 +51,26 @@ void put(std::uint64_t* to, const Pose& p) {
 Pose pose_of(const std::uint64_t* from) {
   return Pose(vector_of(from),
               Eigen::Quaterniond(number_of(from[6]), number_of(from[3]), number_of(from[4]), number_of(from[5])));
+}
+
+void add_line(const std::string& text, WordTable& to) {
+  for (const char c : text + "\n") *to.add_row() = static_cast<unsigned char>(c);
+}
+std::vector<std::string> lines_of(const WordTable& table) {
+  std::vector<std::string> lines;
+  std::string text;
+  for (std::size_t r = 0; r < table.rows; ++r) {
+    const char c = static_cast<char>(*table.row(r));
+    if (c == '\n') lines.push_back(std::exchange(text, {}));
+    else text += c;
+  }
+  return lines;
+}
+
+/// One that is left out where it is empty: then nothing follows, but zeros of less than a word.
+void unpack_last(const char* at, const char* end, WordTable& table) {
+  table.clear(0);
+  if (static_cast<std::size_t>(end - at) >= sizeof(std::uint64_t)) unpack_columns(at, end, table);
 }
 
 /// Mixes a word into a sum that does not depend on the order in which granules come.
@@ -92,7 +114,8 @@ void PartTables::read(const SectionChunk& chunk) {
     at = unpack_columns(at, end, layouts);
     if (head.rows != 1 || head.columns != part_columns) throw InternalError("a part of a restart file has no head");
   }
-  unpack_columns(at, end, bodies);
+  at = unpack_columns(at, end, bodies);
+  unpack_last(at, end, meshes);
 }
 
 void PartTables::append_to(SectionChunk& chunk) const {
@@ -101,6 +124,7 @@ void PartTables::append_to(SectionChunk& chunk) const {
     chunk.append(layouts);
   }
   chunk.append(bodies);
+  if (meshes.rows) chunk.append(meshes);
 }
 
 void ChunkTables::read(const SectionChunk& chunk) {
@@ -115,6 +139,9 @@ void ChunkTables::read(const SectionChunk& chunk) {
   }
   interior.resize(index_below(more, chunk.bytes.size()));
   for (WordTable& table : interior) at = unpack_columns(at, end, table);
+  unpack_last(at, end, wall_loads);
+  if (wall_loads.rows && wall_loads.columns != load_columns)
+    throw InternalError("a chunk of a restart file has other loads on walls");
   if (granules() != chunk.granules) throw InternalError("a chunk of a restart file misses granules");
 }
 
@@ -124,6 +151,7 @@ void ChunkTables::append_to(SectionChunk& chunk) const {
   if (chunk.kind != SectionChunk::interior_granules) return;
   chunk.append(interior.size());
   for (const WordTable& table : interior) chunk.append(table);
+  if (wall_loads.rows) chunk.append(wall_loads);
 }
 
 std::size_t ChunkTables::granules() const {
@@ -184,8 +212,9 @@ void ChunkSource::part(SectionChunk& chunk) {
   put(row + places_lo, places.lo);
   put(row + places_hi, places.hi);
   part.layouts.clear(1);
-  for (int l = 0; l < bed_.atoms.layouts(); ++l)
-    for (const char c : bed_.atoms.layout_text(l) + "\n") *part.layouts.add_row() = static_cast<unsigned char>(c);
+  for (int l = 0; l < bed_.atoms.layouts(); ++l) add_line(bed_.atoms.layout_text(l), part.layouts);
+  part.meshes.clear(1);
+  for (const std::string& name : bed_.walls.mesh_names()) add_line(name, part.meshes);
   std::vector<double> numbers;
   part.bodies.clear(0);
   for (const auto& body : bed_.solid.bodies().bodies()) {
@@ -202,6 +231,7 @@ void ChunkSource::begin_block() {
   contacts_before_ += tables_.contacts.rows;
   tables_.contacts.clear(c_history + bed_.solid.contacts().width());
   tables_.interface_granules.clear(granule_columns());
+  tables_.wall_loads.clear(0);
   tables_.interior.clear();
   by_length_.clear();
 }
@@ -278,6 +308,15 @@ void ChunkSource::interior_block(SectionChunk& chunk) {
     }
     std::copy(record, record + length, granule(tables_.interior[known.first->second], g));
     contacts_of(g.tag);
+    bed_.solid.wall_loads().for_each_of(g.tag, [&](const WallLoad& load) {
+      if (tables_.wall_loads.rows == 0) tables_.wall_loads.clear(load_columns);
+      std::uint64_t* const row = tables_.wall_loads.add_row();
+      row[load_tag] = whole(g.tag);
+      row[load_mesh] = word(load.mesh);
+      row[load_element] = word(load.element);
+      put(row + load_force, load.force);
+      put(row + load_torque, load.torque);
+    });
   };
   slot_ = bed_.solid.store().visit_some(slot_, granules_per_chunk, add);
   std::sort(tables_.interior.begin(), tables_.interior.end(),
@@ -310,16 +349,11 @@ auto ChunkReader::part(const PartTables& tables, std::uint64_t rank) -> const He
   sender_->observer = pose_of(row + observer);
   sender_->observed_then = pose_of(row + observed_then);
   layout_.clear();
-  std::string text;
-  for (std::size_t r = 0; r < tables.layouts.rows; ++r) {
-    const char c = static_cast<char>(*tables.layouts.row(r));
-    if (c != '\n') {
-      text += c;
-      continue;
-    }
-    layout_.push_back(bed_.atoms.layout_from_text(text));
-    text.clear();
-  }
+  for (const std::string& text : lines_of(tables.layouts)) layout_.push_back(bed_.atoms.layout_from_text(text));
+  mesh_.clear();
+  const std::vector<std::string>& names = bed_.walls.mesh_names();
+  for (const std::string& name : lines_of(tables.meshes))
+    mesh_.push_back(static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin()));
   head_.sender = sender_;
   more_bodies(tables.bodies);
   return head_;
@@ -349,6 +383,7 @@ const Parcel& ChunkReader::parcel(const ChunkTables& tables) {
   parcel_.granules.clear();
   read_granules(tables.interface_granules, nullptr);
   read_contacts(tables.contacts);
+  index_wall_loads(tables.wall_loads);
   records_.resize(tables.interior.size());
   for (std::size_t t = 0; t < tables.interior.size(); ++t) {
     numbers_of(tables.interior[t], records_[t]);
@@ -371,6 +406,32 @@ void ChunkReader::read_contacts(const WordTable& table) {
   }
 }
 
+/// Those of one granule stand in a row.
+void ChunkReader::index_wall_loads(const WordTable& table) {
+  loads_ = &table;
+  first_load_ = FlatMap<int>();
+  for (std::size_t r = table.rows; same_walls_ && r-- > 0;) first_load_[static_cast<std::int64_t>(table.row(r)[load_tag])] = static_cast<int>(r);
+}
+
+std::vector<WallLoad> ChunkReader::wall_loads_of(std::int64_t tag) const {
+  std::vector<WallLoad> loads;
+  const int* const first = first_load_.find(tag);
+  if (!first) return loads;
+  for (std::size_t r = static_cast<std::size_t>(*first); r < loads_->rows; ++r) {
+    const std::uint64_t* const row = loads_->row(r);
+    if (row[load_tag] != whole(tag)) break;
+    WallLoad load;
+    read(load.mesh, row[load_mesh]);
+    read(load.element, row[load_element]);
+    if (load.mesh != WallLoad::no_mesh) load.mesh = mesh_[index_below(row[load_mesh], mesh_.size())];
+    load.force = vector_of(row + load_force);
+    load.torque = vector_of(row + load_torque);
+    loads.push_back(load);
+  }
+  std::reverse(loads.begin(), loads.end());  // they are kept the last one first
+  return loads;
+}
+
 /// numbers: the table's, of interior granules; none of interface granules.
 void ChunkReader::read_granules(const WordTable& table, const double* numbers) {
   const std::size_t begin = granule_columns();
@@ -388,6 +449,7 @@ void ChunkReader::read_granules(const WordTable& table, const double* numbers) {
       g.layout = layout_[index_below(static_cast<std::uint64_t>(g.layout), layout_.size())];
       g.record = numbers + r * table.columns + begin;
       g.length = static_cast<int>(table.columns - begin);
+      g.wall_loads = wall_loads_of(g.tag);
     }
     parcel_.granules.push_back(g);
   }

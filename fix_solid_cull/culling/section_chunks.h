@@ -8,6 +8,7 @@
 
 #include "bed.h"
 #include "cover.h"
+#include "flat_map.h"
 #include "parcels.h"
 #include "store_section.h"
 
@@ -15,14 +16,14 @@ namespace solidcull {
 
 /// The tables of a chunk of kind `part`, and of `more_bodies` (see ChunkShares), which has the bodies alone.
 struct PartTables {
-  WordTable head, layouts, bodies;
+  WordTable head, layouts, meshes, bodies;
   void read(const SectionChunk& chunk);
   void append_to(SectionChunk& chunk) const;
 };
 
 /// The tables of a chunk of granules.
 struct ChunkTables {
-  WordTable interface_granules, contacts;
+  WordTable interface_granules, contacts, wall_loads;
   std::vector<WordTable> interior;
   void read(const SectionChunk& chunk);
   void append_to(SectionChunk& chunk) const;
@@ -33,6 +34,7 @@ struct ChunkTables {
 namespace chunk_columns {
 constexpr std::size_t granule_tag = 0, granule_body = 1;
 constexpr std::size_t low = 0, high = 1, contact_body = 2, known = 3, history = 4;
+constexpr std::size_t load_tag = 0, load_mesh = 1, load_element = 2, load_force = 3, load_torque = 6, load_columns = 9;
 }  // namespace chunk_columns
 
 /// Of a row of interface or interior granules: see StoredGranule::home().
@@ -78,7 +80,8 @@ class ChunkSource {
 /// Reads the chunks of one part. Local.
 class ChunkReader {
  public:
-  explicit ChunkReader(const Bed& bed) : bed_(bed) {}
+  /// same_walls: what granules press on walls is read too.
+  ChunkReader(const Bed& bed, bool same_walls) : bed_(bed), same_walls_(same_walls) {}
 
   struct Head {
     Box own;     ///< the subdomain of the rank that wrote
@@ -97,11 +100,17 @@ class ChunkReader {
  private:
   void read_contacts(const WordTable& table);
   void read_granules(const WordTable& table, const double* numbers);
+  void index_wall_loads(const WordTable& table);
+  std::vector<WallLoad> wall_loads_of(std::int64_t tag) const;
 
   const Bed& bed_;
+  const bool same_walls_;
   Head head_;
   std::shared_ptr<Sender> sender_;
   std::vector<int> layout_;
+  std::vector<int> mesh_;      // of the file: its number here
+  FlatMap<int> first_load_;    // of a granule: its row
+  const WordTable* loads_ = nullptr;  // of this chunk
   Parcel parcel_;
   ChunkTables tables_;
   std::vector<double> histories_;

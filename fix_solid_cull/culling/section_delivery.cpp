@@ -16,8 +16,8 @@ std::vector<std::int64_t> atoms_that_wait(const Bed& bed) {
 
 }  // namespace
 
-SectionDelivery::SectionDelivery(Bed& bed, Parcels& parcels, SectionReader& section)
-    : bed_(bed), parcels_(parcels), section_(section), atoms_(bed.ranks, atoms_that_wait(bed)), shares_(bed) {}
+SectionDelivery::SectionDelivery(Bed& bed, Parcels& parcels, SectionReader& section, bool same_walls)
+    : bed_(bed), same_walls_(same_walls), parcels_(parcels), section_(section), atoms_(bed.ranks, atoms_that_wait(bed)), shares_(bed) {}
 
 SectionCounts SectionDelivery::take_all() {
   parcels_.begin_taking();
@@ -66,7 +66,7 @@ void SectionDelivery::exchange_shares() {
 }
 
 void SectionDelivery::take(int from, const ChunkShare& share, std::uint64_t part) {
-  ChunkReader& reader = readers_.try_emplace(from, bed_).first->second;
+  ChunkReader& reader = readers_.try_emplace(from, bed_, same_walls_).first->second;
   if (share.begins)
     reader.part(share.part, part);
   else

@@ -19,7 +19,8 @@ namespace solidcull {
 /// their granules; those between ranks of which only one has heard so far follow at the end.
 class SectionDelivery {
  public:
-  SectionDelivery(Bed& bed, Parcels& parcels, SectionReader& section);
+  /// same_walls: what granules press on walls is taken up too.
+  SectionDelivery(Bed& bed, Parcels& parcels, SectionReader& section, bool same_walls);
   /// Returns what this rank read. InputError for a damaged file. Collective.
   SectionCounts take_all();
 
@@ -31,6 +32,7 @@ class SectionDelivery {
   void exchange_contacts();
 
   Bed& bed_;
+  const bool same_walls_;
   Parcels& parcels_;
   SectionReader& section_;
   TagOwners atoms_;

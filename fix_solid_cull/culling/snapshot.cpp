@@ -6,6 +6,7 @@
 #include <cstring>
 #include <string>
 
+#include "bits.h"
 #include "input_error.h"
 #include "section_delivery.h"
 #include "word_sum.h"
@@ -13,7 +14,7 @@
 namespace solidcull {
 namespace {
 
-constexpr double file_mark = 20261210;  // the format's version
+constexpr double file_mark = 20261228;  // the format's version
 /// The numbers in the file's head. The largest stored radius of each type and a check sum follow them.
 enum Header {
   mark,
@@ -31,6 +32,8 @@ enum Header {
   clumps_in_shell,
   largest_clump,
   highest_clump,
+  walls_high,
+  walls_low,
   identity_high,
   identity_low,
   types,
@@ -38,6 +41,13 @@ enum Header {
 };
 constexpr std::size_t check_sum_size = 2;
 constexpr double most_types = 1e6;
+
+/// Of the walls, and of how far they reach.
+std::uint64_t sum_of_walls(const Bed& bed) {
+  std::uint64_t sum = bits_of(bed.run.skin);
+  for (const std::uint64_t part : bed.ranks.gather(std::vector<std::uint64_t>{bed.walls.part_of_sum()})) sum += part;
+  return sum;
+}
 
 /// In two halves that doubles hold exactly.
 std::array<double, 2> halves(std::uint64_t word) {
@@ -72,6 +82,7 @@ std::vector<double> Snapshot::write(bool run_begins) {
   std::vector<double> radii = bed_.solid.largest_radius_by_type();
   bed_.ranks.largest(radii.data(), static_cast<int>(radii.size()));
   identity_ = store ? ChunkSource::identity(bed_) : 0;
+  const std::uint64_t walls = sum_of_walls(bed_);
   if (bed_.ranks.me != 0) return {};
   std::vector<double> state(1 + header_size);
   state[0] = static_cast<double>(state.size() + radii.size() + check_sum_size);
@@ -88,8 +99,9 @@ std::vector<double> Snapshot::write(bool run_begins) {
   h[step] = static_cast<double>(bed_.run.step);
   h[no_places] = bed_.scales.refills();
   h[has_section] = store;
-  const auto name = halves(identity_);
+  const auto name = halves(identity_), of_walls = halves(walls);
   std::copy(name.begin(), name.end(), h + identity_high);
+  std::copy(of_walls.begin(), of_walls.end(), h + walls_high);
   h[clumps_in_shell] = static_cast<double>(held[1]);
   h[largest_clump] = clumps[0];
   h[highest_clump] = clumps[1];
@@ -164,6 +176,7 @@ void Snapshot::read(const std::vector<double>& state, const std::string& file) {
 void Snapshot::take_up() {
   const std::vector<double> state = std::move(state_);
   state_.clear();
+  taken_up_ = true;
   const double* const h = state.data();
   if (static_cast<std::size_t>(h[width]) != bed_.solid.contacts().width())
     throw InputError("the restart file holds contact histories of " + std::to_string(static_cast<int>(h[width])) +
@@ -179,10 +192,12 @@ void Snapshot::take_up() {
   const std::uint64_t identity = joined(h + identity_high);
   bed_.index.index(bed_.atoms);
   if (bed_.ranks.subdomains_changed()) bed_.ranks.update();
+  same_walls_ = joined(h + walls_high) == sum_of_walls(bed_);
   SectionReader section(bed_.ranks, file_, identity);
   const bool as_it_was = static_cast<int>(h[ranks]) == bed_.ranks.count &&
                          section.parts().size() == static_cast<std::size_t>(bed_.ranks.count) && stands_as_it_was(section);
-  const SectionCounts taken = as_it_was ? take_as_it_was(section) : SectionDelivery(bed_, parcels_, section).take_all();
+  const SectionCounts taken = as_it_was ? take_as_it_was(section)
+                                       : SectionDelivery(bed_, parcels_, section, same_walls_).take_all();
   check_counts(section.counts(), taken);
 }
 
@@ -213,7 +228,7 @@ bool Snapshot::stands_as_it_was(SectionReader& section) const {
   std::int64_t locked = 0;
   for (int i = 0; i < bed_.atoms.owned; ++i) locked += bed_.shell[i].locked;
   bool same = true, moved = false, within = false;  // moved: the borders of the subdomain
-  ChunkReader reader(bed_);
+  ChunkReader reader(bed_, same_walls_);
   SectionChunk chunk;
   const std::vector<ChunkPlace> chunks = section.list(static_cast<std::size_t>(bed_.ranks.me));
   for (const ChunkPlace& c : chunks) {
@@ -242,7 +257,7 @@ bool Snapshot::stands_as_it_was(SectionReader& section) const {
 }
 
 SectionCounts Snapshot::take_as_it_was(SectionReader& section) {
-  ChunkReader reader(bed_);
+  ChunkReader reader(bed_, same_walls_);
   SectionCounts taken;
   SectionChunk chunk;
   for (const ChunkPlace& c : section.list(static_cast<std::size_t>(bed_.ranks.me))) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bed.h"
@@ -37,6 +38,11 @@ class Snapshot {
   bool waits() const { return !state_.empty(); }
   /// Once there are atoms. InputError for another contact model, or a damaged file. Collective.
   void take_up();
+  /// Whether the walls are those of the file that was taken up: then what stored granules press on them is known. On all ranks the
+  /// same.
+  bool walls_are_as_they_were() const { return same_walls_; }
+  /// Whether a file was taken up since this was asked last.
+  bool take_taken_up() { return std::exchange(taken_up_, false); }
 
  private:
   bool stands_as_it_was(SectionReader& section) const;
@@ -50,6 +56,8 @@ class Snapshot {
   const Cover& cover_;
   std::vector<double> state_;   // of the file's head
   std::string file_;            // that was read
+  bool same_walls_ = false;     // when it was taken up
+  bool taken_up_ = false;
   bool told_ = false;           // that files of this run hold more than atoms
   std::uint64_t identity_ = 0;  // of the file that is being written
 };

@@ -21,14 +21,17 @@
 //   one row: the rank's subdomain (lowest x y z, highest), the observers of Cover (each: origin, quaternion x y z w), a box in
 //     the world that holds the centres of its interior granules (lowest x y z, highest);
 //   one column: the characters of the texts of column layouts, one line each, in the order of their numbers;
-//   one row for each body of the rank: its numbers, as doubles, in the order of SolidBody::each_number().
+//   one row for each body of the rank: its numbers, as doubles, in the order of SolidBody::each_number();
+//   one column, where there are any: likewise the names of meshes that report their load.
 // Tables of granules:
 //   interface granules: tag, body (its row in the part), their numbers in the order of StoredGranule::each_number(), the whole
 //     ones and flags as whole numbers;
 //   contacts: the lower tag, the higher one, body in whose frame the history is, whether it has a history, the history as the
 //     lower tag sees it;
 //   how many further tables follow (one word), each of interior granules whose engine records are equally long: the same, and
-//     the record.
+//     the record;
+//   with these, where there are any: what walls press on them: tag, mesh, element, force, torque, as in WallLoad; those of one
+//     granule in a row, the last one first. The mesh by its place in the part's names.
 // A contact stands with the one of its granules that comes later in this rank's chunks, or with the one that is on this rank; a
 // contact across ranks stands with either rank.
 #pragma once

@@ -214,10 +214,14 @@ BinEdges bin_edges(const LAMMPS_NS::Neighbor& neighbor, const LAMMPS_NS::Atom& a
   return {neighbor.*member(NeighborBinsOwn()) ? neighbor.*member(NeighborBinEdge()) : 0.0, atom.*member(SortBinEdge())};
 }
 
-void set_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_NS::Memory& memory, const BinEdges& edges) {
+void plan_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, const BinEdges& edges) {
   neighbor.*member(NeighborBinsOwn()) = edges.neighbor > 0;
   neighbor.*member(NeighborBinEdge()) = edges.neighbor;
   atom.*member(SortBinEdge()) = edges.sort;
+}
+
+void set_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_NS::Memory& memory, const BinEdges& edges) {
+  plan_bin_edges(neighbor, atom, edges);
   const auto drop = [&](int*& heads, int& size) {
     memory.destroy(heads);
     heads = nullptr;

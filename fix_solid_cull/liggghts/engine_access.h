@@ -85,6 +85,8 @@ struct BinEdges {
 BinEdges bin_edges(const LAMMPS_NS::Neighbor& neighbor, const LAMMPS_NS::Atom& atom);
 /// Makes the bins anew; none smaller than they have to be. Likewise.
 void set_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, LAMMPS_NS::Memory& memory, const BinEdges& edges);
+/// For the bins that the engine makes next.
+void plan_bin_edges(LAMMPS_NS::Neighbor& neighbor, LAMMPS_NS::Atom& atom, const BinEdges& edges);
 /// How many bins the neighbour build has on this rank.
 int neighbor_bins(const LAMMPS_NS::Neighbor& neighbor);
 /// The region that an insert/pack or insert/rate fix fills.

@@ -9,6 +9,7 @@
 #include "atom.h"
 #include "atom_vec.h"
 #include "comm.h"
+#include "domain.h"
 #include "engine_access.h"
 #include "fix_contact_history.h"
 #include "force.h"
@@ -88,12 +89,26 @@ void EngineMemory::fit_bins(bool some_stored) {
     return;
   }
   if (!some_stored || bins < few_bins || atoms > few_atoms * bins || neighbor->style != bin_style) return;
+  widen_bins(0.5 * neighbor->cutneighmax);
+  if (wide_) engine::set_bin_edges(*neighbor, *atom, *memory, ours_);
+}
+
+/// From an edge that is the engine's choice; not where the deck has its own.
+void EngineMemory::widen_bins(double edge) {
   const engine::BinEdges now = engine::bin_edges(*neighbor, *atom);
-  if (now.neighbor > 0 || now.sort > 0) return;     // the deck's own
-  const double edge = 0.5 * neighbor->cutneighmax;  // the engine's choice
+  if (now.neighbor > 0 || now.sort > 0) return;
   ours_ = {wider_neighbor * edge, wider_sort * edge};
-  engine::set_bin_edges(*neighbor, *atom, *memory, ours_);
   wide_ = true;
+}
+
+void EngineMemory::expect_stored(double largest_radius) {
+  if (wide_ || neighbor->style != bin_style) return;
+  const double edge = largest_radius + 0.5 * neighbor->skin;
+  double bins = 1;
+  for (int d = 0; d < 3; ++d) bins *= (domain->subhi[d] - domain->sublo[d]) / edge;
+  if (bins < few_bins || atom->nlocal > few_atoms * bins) return;
+  widen_bins(edge);
+  if (wide_) engine::plan_bin_edges(*neighbor, *atom, ours_);
 }
 
 void EngineMemory::give_bins_back() {

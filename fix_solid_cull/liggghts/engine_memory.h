@@ -34,8 +34,10 @@ class EngineMemory : public Memory, protected LAMMPS_NS::Pointers {
   void fit_bins(bool some_stored) override;
   /// They are again as the engine makes them.
   void give_bins_back() override;
+  void expect_stored(double largest_radius) override;
 
  private:
+  void widen_bins(double edge);
   /// The most atoms for which arrays are no larger than they should be where so many are left.
   int fair(int left) const;
 

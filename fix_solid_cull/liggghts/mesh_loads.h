@@ -24,6 +24,8 @@ class MeshLoads : protected LAMMPS_NS::Pointers {
 
   /// Finds the deck's meshes again; they come and go between runs, and keep their numbers.
   void connect();
+  /// IDs of the meshes, by number.
+  const std::vector<std::string>& names() const { return names_; }
   /// The engine begins to compute forces: what was seen before is over. `watch`: whether of() may be asked about these forces.
   void begin_step(bool watch) {
     seen_.clear();

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "atom.h"
+#include "comm.h"
 #include "domain.h"
 #include "fix_mesh_surface.h"
 #include "fix_neighlist_mesh.h"
@@ -14,6 +15,7 @@
 #include "neighbor.h"
 #include "primitive_wall.h"
 #include "tri_mesh.h"
+#include "word_sum.h"
 
 namespace solidcull {
 
@@ -48,6 +50,11 @@ double gap_to(LAMMPS_NS::PrimitiveWall& wall, const double* place, double radius
   x[(axis + 1) % 3] += beside;
   const double gap_beside = wall.resolveContact(x, radius, to_wall);
   return gap_beside + beside;
+}
+
+void add_text(WordSum& sum, const char* name) {
+  for (const char* c = name; *c; ++c) sum.add(*c);
+  sum.add(0);
 }
 
 }  // namespace
@@ -148,6 +155,66 @@ std::vector<double> WallContacts::fingerprint() const {
   }
   for (const std::string& name : names()) f.insert(f.end(), name.begin(), name.end());
   return f;
+}
+
+std::uint64_t WallContacts::sum_of_materials() const {
+  std::uint64_t sum = 0;
+  for (int i = 0; i < modify->n_fixes_style("property/global"); ++i) {
+    LAMMPS_NS::Fix* fix = modify->find_fix_style("property/global", i);
+    WordSum one;
+    add_text(one, fix->id);
+    if (fix->scalar_flag) one.add(fix->compute_scalar());
+    for (int k = 0; fix->vector_flag && k < fix->size_vector; ++k) one.add(fix->compute_vector(k));
+    for (int r = 0; fix->array_flag && r < fix->size_array_rows; ++r)
+      for (int c = 0; c < fix->size_array_cols; ++c) one.add(fix->compute_array(r, c));
+    sum += one.value();
+  }
+  return sum;
+}
+
+std::uint64_t WallContacts::part_of_sum() const {
+  std::uint64_t sum = 0;
+  if (comm->me == 0) {
+    sum = sum_of_materials();
+    for (FixWallGran* wall : walls_) {
+      WordSum one;
+      add_text(one, wall->id);
+      one.add(wall->groupbit);
+      one.add(wall->is_moving());
+      one.add(wall->dnum());
+      if (!wall->is_mesh_wall()) {
+        one.add(wall->atom_type_wall());
+        for (int corner = 0; corner < 8; ++corner) {  // of a cube around the origin
+          double x[3], to_wall[3];
+          for (int d = 0; d < 3; ++d) x[d] = corner >> d & 1 ? 1.0 : -1.0;
+          one.add(wall->primitiveWall()->resolveContact(x, 0, to_wall));
+        }
+      }
+      for (int m = 0; wall->is_mesh_wall() && m < wall->n_meshes(); ++m) {
+        FixMeshSurface* fix = wall->mesh_list()[m];
+        add_text(one, fix->id);
+        one.add(fix->groupbit);
+        one.add(fix->atomTypeWall());
+        one.add(fix->triMesh()->isMoving());
+      }
+      sum += one.value();
+    }
+  }
+  for (TriMesh* mesh : meshes_) {
+    const bool all_have_it = mesh->sizeGlobal() == 0;  // before the first run sets up
+    if (mesh->isMoving() || (all_have_it && comm->me != 0)) continue;
+    for (int t = 0; t < mesh->sizeLocal(); ++t) {
+      WordSum one;
+      one.add(mesh->id(t));
+      for (int k = 0; k < 3; ++k) {
+        double node[3];
+        mesh->node(t, k, node);
+        for (const double x : node) one.add(x);
+      }
+      sum += one.value();
+    }
+  }
+  return sum;
 }
 
 std::vector<std::string> WallContacts::names() const {

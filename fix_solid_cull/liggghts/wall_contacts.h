@@ -1,6 +1,7 @@
 // Walls and meshes of `fix wall/gran`, asked which granules they touch.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -33,12 +34,15 @@ class WallContacts : protected LAMMPS_NS::Pointers {
 
   /// IDs of the walls and their meshes, sorted: to see that one has gone.
   std::vector<std::string> names() const;
-  /// See Walls::fingerprint.
+  /// See Walls.
   std::vector<double> fingerprint() const;
+  std::uint64_t part_of_sum() const;
   /// A fix of this style was made: what walls are made of, or how they move, may be other.
   static void fix_was_made(const char* style);
 
  private:
+  std::uint64_t sum_of_materials() const;
+
   std::vector<LAMMPS_NS::FixWallGran*> walls_;
   std::vector<LAMMPS_NS::TriMesh*> meshes_;  // of the walls, by WallTriangle::mesh
 };

@@ -28,6 +28,8 @@ class EngineWalls : public Walls {
   bool primitive_near(const Sphere& s, double gap) const override { return contacts_.primitive_near(s, gap); }
   std::vector<std::string> names() const override { return contacts_.names(); }
   std::vector<double> fingerprint() const override { return contacts_.fingerprint(); }
+  std::uint64_t part_of_sum() const override { return contacts_.part_of_sum(); }
+  const std::vector<std::string>& mesh_names() const override { return loads_.names(); }
   std::vector<WallLoad> loads_on(std::int64_t tag) override { return loads_.of(tag); }
   void press(int mesh, int element, const Vec3& force, const Vec3& torque) override {
     loads_.press(mesh, element, force, torque);

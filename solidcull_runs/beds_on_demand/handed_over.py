@@ -10,10 +10,10 @@ from .pieces import Pieces
 HERE = Path(__file__).resolve().parent
 
 
-def deck(plan):
-    """The deck that reads the bed and runs."""
+def deck(plan, floor=None):
+    """The deck that reads the bed and runs. `floor`: the file of its floor, where it does not have its own name yet."""
     w = plan.wanted
-    text = (HERE / "start.in").read_text()
+    text = (HERE / "start.in").read_text().replace("BED.floor.stl", floor or "BED.floor.stl")
     for word, value in (("BED", w.out.stem), ("SKIN", plan.common()["skin"]), ("TYPES", str(w.material.types)),
                         ("LENGTH", f"{w.length:.12g}"), ("WIDTH", f"{w.width:.12g}"), ("MATERIAL", w.material.text)):
         text = text.replace(word, value)
@@ -32,7 +32,7 @@ def laid_bed(pieces, count, bed_floor, part, say):
     asleep, dozed = pieces.asleep(base, plan.base_sides(), floor)
     say(f"  laying {plan.copies[0]} x {plan.copies[1]} tiles")
     began = time.process_time()
-    granules = pieces.laid(asleep, floor, bed_floor, part)
+    granules = pieces.laid(asleep, floor, bed_floor, part, deck(plan, bed_floor.name))
     weight, small = (n * facts["mass"] * plan.g for n in (plan.copies[0] * plan.copies[1], LEAST * LEAST))
     # a metre of its sides bears what one of the small bed bears
     by_sides = (small - dozed["floor load"]) * (plan.wanted.length + plan.wanted.width) / sum(plan.base_sides())

@@ -11,6 +11,7 @@ from ..laid import beds as laid_beds
 from ..laid import tiles
 from ..laid.floors import Floor, write_floor
 from ..laid.sources import Source
+from ..laid.walls import box_of, number_of
 from . import measures
 from .plan import LEAST
 
@@ -109,8 +110,9 @@ class Pieces:
             return {"floor load": last.rows[-1][last.columns.index("onfloor")]}
         return self.made("asleep", self.recipe("doze.in", variables, beds.recipe_of(bed), engine.hash_of_fix(self.launcher)), make)
 
-    def laid(self, asleep, floor, new_floor, part):
-        """Writes the culled file of all tiles; how many granules it holds."""
+    def laid(self, asleep, floor, new_floor, part, deck):
+        """Writes the culled file of all tiles, for the walls of a deck in the folder; how many granules it holds."""
         plan = self.plan
         source = Source(asleep, ALL, plan.period, plan.margin, Floor(floor))
-        return laid_beds.lay(source, part, plan.copies, Floor(new_floor), plan.top)
+        walls = number_of(deck, box_of(source.sides(plan.copies), 2 * source.radius, plan.top), self.launcher, self.folder)
+        return laid_beds.lay(source, part, plan.copies, Floor(new_floor), plan.top, walls=walls)

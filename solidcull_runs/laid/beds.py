@@ -17,7 +17,8 @@ import numpy as np
 from . import culled_files as files
 from . import tiles
 from .bodies import FORWARD, Bodies
-from .columns import BODY, C_BODY, HELD, HIGH, HISTORY, LOW, MASS, PLACE, RADIUS, RECORD, TAG, WORDS, numbers, words
+from .columns import (BODY, C_BODY, HELD, HIGH, HISTORY, L_ELEMENT, L_FORCE, L_MESH, L_TAG, L_TORQUE, LOW, MASS, NO_MESH, PLACE, RADIUS, RECORD, TAG, WORDS,
+                      numbers, words)
 from .floors import elements
 
 
@@ -43,9 +44,10 @@ def packed_tile(source, t, key):
     return source.packed[t, key]
 
 
-def lay(source, file, copies, floor, top, shift=0.0):
+def lay(source, file, copies, floor, top, shift=0.0, walls=0):
     """Writes the bed of copies[0] x copies[1] tiles, of a Source, on a Floor, under an open top (m). `shift` (m): of the ball, along x.
-    Returns how many granules it holds."""
+    `walls`: the number of its walls, see walls.py; without it what is at walls is atoms in the first step of a run. Returns how many
+    granules it holds."""
     size = source.size
     laid = [(i, j) for i in range(copies[0]) for j in range(copies[1])]
     like = {place: source.like(*place, copies) for place in laid}
@@ -67,7 +69,7 @@ def lay(source, file, copies, floor, top, shift=0.0):
     identity = int.from_bytes(hashlib.sha256(struct.pack("<4q", *copies, size, source.step) + os.urandom(16)).digest()[:8], "little")
     part = Path(f"{file}.part")
     with open(part, "wb") as f:
-        write_head(f, source, copies, like, index, corner, floor, total, interface, identity, top, shift)
+        write_head(f, source, copies, like, index, corner, floor, total, interface, identity, top, shift, walls)
         out = files.SectionWriter(f, identity)
         write_part(out, source, bodies, source.sides(copies), top)
         contacts = 0
@@ -98,8 +100,10 @@ def lay(source, file, copies, floor, top, shift=0.0):
                 count += table.shape[1]
             edges = contacts_of(source, bodies, place, like, index, copies)
             contacts += edges.shape[1]
+            loads = wall_loads(source, t, index[place], corner_then[t], corner[place], floor)
             out.put(files.INTERIOR, count, files.packed_table([np.empty(0, WORDS)] * RECORD, 0),
-                    files.packed_table(list(edges), edges.shape[1]), struct.pack("<Q", len(own)), *own)
+                    files.packed_table(list(edges), edges.shape[1]), struct.pack("<Q", len(own)), *own,
+                    *[files.packed_table(list(loads), loads.shape[1])] * bool(loads.shape[1]))
         out.close(total - interface, interface, contacts)
     if strange > 0.01 * max(1, total):
         part.unlink()
@@ -129,16 +133,30 @@ def contacts_of(source, bodies, place, like, index, copies):
     return np.concatenate(found, axis=1) if found else np.empty((HISTORY + source.width, 0), WORDS)
 
 
+def wall_loads(source, t, tile, corner_then, corner, floor):
+    """What walls press on the granules of a tile, where it lies now: on the elements that are there, torques about the origin."""
+    loads = source.wall_loads[t].copy()
+    local = loads[L_TAG].astype(int)
+    loads[L_TAG] += WORDS.type(tile * source.size + 1)
+    on_mesh = np.flatnonzero(loads[L_MESH] != NO_MESH)
+    x = source.places(t)[local[on_mesh]]
+    loads[L_ELEMENT, on_mesh], _ = elements(loads[L_ELEMENT, on_mesh], x + corner_then, x + corner, source.floor, floor)
+    force, torque = (numbers(loads[k:k + 3, on_mesh].T) for k in (L_FORCE, L_TORQUE))
+    loads[L_TORQUE:L_TORQUE + 3, on_mesh] = words((torque + np.cross(corner - corner_then, force)).T)
+    return loads
+
+
 def write_part(out, source, bodies, sides, top):
     low = -2 * source.radius
     pose = [0, 0, 0, 0, 0, 0, 1]
     row = [low, low, low, sides[0] - low, sides[1] - low, top, *pose, *pose, 0, 0, 0, *sides, top]
     table = bodies.table()
     out.put(files.PART, 0, files.packed_table(list(words(np.array(row)).reshape(-1, 1)), 1),
-            files.packed_table(source.layouts, len(source.layouts[0])), files.packed_table(list(words(table.T)), len(table)))
+            files.packed_table(source.layouts, len(source.layouts[0])), files.packed_table(list(words(table.T)), len(table)),
+            *[files.packed_table(source.meshes, len(source.meshes[0]))] * bool(source.meshes))
 
 
-def write_head(f, source, copies, like, index, corner, floor, total, interface, identity, top, shift):
+def write_head(f, source, copies, like, index, corner, floor, total, interface, identity, top, shift, walls):
     """LIGGGHTS's part: its numbers, and the atoms: the ball, and the interface granules."""
     sides = source.sides(copies)
 
@@ -146,6 +164,7 @@ def write_head(f, source, copies, like, index, corner, floor, total, interface, 
         state[files.STATE_INTERIOR] = total - interface
         state[files.STATE_COUNTERS:files.STATE_COUNTERS + 6] = total, 0, 0, 0, 0, 0
         state[files.STATE_IDENTITY:files.STATE_IDENTITY + 2] = identity >> 32, identity & files.LOW
+        state[files.STATE_WALLS:files.STATE_WALLS + 2] = walls >> 32, walls & files.LOW
     head = bytearray(files.with_state(tiles.without_meshes(source.head), change))
     where = tiles.header_places(head)
     low = -2 * source.radius

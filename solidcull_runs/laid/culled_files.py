@@ -15,9 +15,9 @@ BEGINS, ENDS = b"SDCULLB1", b"SDCULLE1"
 END = 72                                                 # bytes of a section's end
 PART, INTERFACE, INTERIOR = 1, 2, 3                      # kinds of chunks
 ONE, MOST, FEW, LIKE, NARROW, PLAIN = range(6)           # ways to keep a column
-MARK = 20261210.0                                        # of the fix's numbers
+MARK = 20261228.0                                        # of the fix's numbers
 (STATE_MARK, STATE_SIZE, STATE_INTERIOR, STATE_DIAMETER) = range(1, 5)
-STATE_COUNTERS, STATE_WIDTH, STATE_RANKS, STATE_STEP, STATE_NO_PLACES, STATE_SECTION, STATE_IDENTITY, STATE_TYPES = 9, 15, 16, 17, 18, 19, 23, 25
+STATE_COUNTERS, STATE_WIDTH, STATE_RANKS, STATE_STEP, STATE_NO_PLACES, STATE_SECTION, STATE_WALLS, STATE_IDENTITY, STATE_TYPES = 9, 15, 16, 17, 18, 19, 23, 25, 27
 HIGH, LOW = 0xffffffff00000000, 0xffffffff
 WORDS = np.dtype("<u8")
 
@@ -102,6 +102,11 @@ def unpacked_table(data, at):
             raise CulledFileError(f"a column is kept in an unknown way, {way}")
         columns.append(column)
     return columns, rows, at
+
+
+def last_table(data, at):
+    """Of one that is left out where it is empty: its columns, and its rows."""
+    return unpacked_table(data, at)[:2] if len(data) - at >= WORDS.itemsize else ([], 0)
 
 
 def full(columns):

@@ -5,8 +5,8 @@ import numpy as np
 
 from . import culled_files as files
 from . import tiles
-from .columns import (C_BODY, CHANGE, CLUMP, COUNT, FROM_END, HIGH, HISTORY, LAYOUT, LOW, NUMBERS, ORIGIN, PLACE, QUATERNION, RADIUS,
-                      RECORD, TAG, VECTOR_WIDTH, BODY, numbers, turn_of, words)
+from .columns import (C_BODY, CHANGE, CLUMP, COUNT, FROM_END, HIGH, HISTORY, L_TAG, LAYOUT, LOAD_COLUMNS, LOW, NUMBERS, ORIGIN, PLACE,
+                      QUATERNION, RADIUS, RECORD, TAG, VECTOR_WIDTH, BODY, numbers, turn_of, words)
 from .columns import WORDS
 
 
@@ -28,6 +28,7 @@ class Source:
         n = copies[0] * copies[1]
         # granules of a tile: {columns: list of arrays}, one set of columns for each length of record; lists while reading
         self.interior, self.interface, contacts = [{} for _ in range(n)], [[] for _ in range(n)], [{} for _ in range(n)]
+        self.wall_loads = [[np.empty((LOAD_COLUMNS, 0), WORDS)] for _ in range(n)]
         for kind, _, _, data in section.chunks():
             if kind == files.PART:
                 self.read_part(data)
@@ -44,9 +45,13 @@ class Source:
                 for _ in range(more):
                     table, rows, at = files.unpacked_table(data, at)
                     self.split_interior(np.array(files.full(table)))
+                table, rows = files.last_table(data, at)
+                if rows:
+                    self.split_wall_loads(np.array(files.full(table)))
         self.interior = [{length: np.concatenate(parts, axis=1) for length, parts in sorted(of.items())} for of in self.interior]
         self.interface = [np.concatenate(parts, axis=1) if parts else np.empty((RECORD, 0), WORDS) for parts in self.interface]
         self.contacts = [{way: np.concatenate(parts, axis=1) for way, parts in of.items()} for of in contacts]
+        self.wall_loads = [np.concatenate(parts, axis=1) for parts in self.wall_loads]
         self.radius = max(float(numbers(t[RADIUS]).max()) for of in self.interior for t in of.values() if t.shape[1])
         self.packed = {}
         self.body_of = np.full((n, self.size), self.main)
@@ -89,7 +94,8 @@ class Source:
                     meshes += [at_column + 1 + k * (1 + self.width) for k in range((length - 1) // (1 + self.width))]
                 at_column += length
             self.columns.append((at_column, meshes))
-        table, rows, _ = files.unpacked_table(data, at)
+        table, rows, at = files.unpacked_table(data, at)
+        self.meshes, _ = files.last_table(data, at)
         self.bodies = numbers(np.array(files.full(table)).T.copy()) if rows else np.empty((0, 81))
         self.tail = self.bodies.shape[1] - FROM_END
         self.turns = np.array([turn_of(b[QUATERNION:QUATERNION + 4]) for b in self.bodies])
@@ -121,6 +127,19 @@ class Source:
             rows = np.flatnonzero(table[LAYOUT] == layout)
             for t in np.unique(tile[rows]):
                 self.interior[t].setdefault((table.shape[0], int(layout)), []).append(table[:, rows[tile[rows] == t]])
+
+    def split_wall_loads(self, table):
+        tag = table[L_TAG].astype(np.int64) - 1
+        table[L_TAG] = (tag % self.size).astype(WORDS)
+        for t in np.unique(tag // self.size):
+            self.wall_loads[t].append(table[:, tag // self.size == t])
+
+    def places(self, t):
+        """Of the interior granules of a tile, from its corner, by their tags in it."""
+        at = np.full((self.size, 3), np.nan)
+        for table in self.interior[t].values():
+            at[table[TAG].astype(int)] = numbers(table[PLACE:PLACE + 3].T)
+        return at
 
     def split_contacts(self, table, to):
         low, high = (table[k].astype(np.int64) - 1 for k in (LOW, HIGH))

@@ -12,6 +12,8 @@
 #include <exception>
 #include <thread>
 
+#include "word_sum.h"
+
 namespace solidcull {
 namespace {
 
@@ -800,6 +802,18 @@ std::vector<double> SmallWalls::fingerprint() const {
         if (!m.moving) f.insert(f.end(), v.data(), v.data() + 3);
   for (const std::string& name : names()) f.insert(f.end(), name.begin(), name.end());
   return f;
+}
+
+std::uint64_t SmallWalls::part_of_sum() const {
+  WordSum sum;
+  for (const double x : fingerprint()) sum.add(x);
+  return world_.ranks.me == 0 ? sum.value() : 0;
+}
+
+const std::vector<std::string>& SmallWalls::mesh_names() const {
+  mesh_names_.clear();
+  for (const SmallDeck::Mesh& m : world_.deck.meshes) mesh_names_.push_back(m.name);
+  return mesh_names_;
 }
 
 std::vector<std::string> SmallWalls::names() const {

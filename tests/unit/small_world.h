@@ -215,6 +215,8 @@ class SmallWalls : public Walls {
   bool primitive_near(const Sphere& s, double gap) const override;
   std::vector<std::string> names() const override;
   std::vector<double> fingerprint() const override;
+  std::uint64_t part_of_sum() const override;
+  const std::vector<std::string>& mesh_names() const override;
   std::vector<WallLoad> loads_on(std::int64_t tag) override;
   void press(int mesh, int element, const Vec3& force, const Vec3& torque) override;
 
@@ -240,6 +242,7 @@ class SmallWalls : public Walls {
 
   SmallWorld& world_;
   std::vector<std::pair<std::int64_t, WallLoad>> seen_;
+  mutable std::vector<std::string> mesh_names_;
 };
 
 class SmallInsertions : public Insertions {
@@ -332,9 +335,11 @@ class SmallMemory : public Memory {
   void fit() override;
   void fit_bins(bool some_stored) override { bins_wide = some_stored; }
   void give_bins_back() override { bins_wide = false; }
+  void expect_stored(double largest_radius) override { expected = largest_radius; }
 
   std::size_t bytes_freed = 0, room_for = 0;
   bool large = false, bins_wide = false;
+  double expected = 0;  // m
   int fits = 0;
 
  private:

@@ -392,11 +392,13 @@ std::multiset<std::vector<std::uint64_t>> rows_of(const File& file) {
       }
     };
     tables(chunk.kind == SectionChunk::part ? 3 : 2);
-    if (chunk.kind != SectionChunk::interior_granules) continue;
-    std::uint64_t more = 0;
-    std::memcpy(&more, at, sizeof more);
-    at += sizeof more;
-    tables(more);
+    if (chunk.kind == SectionChunk::interior_granules) {
+      std::uint64_t more = 0;
+      std::memcpy(&more, at, sizeof more);
+      at += sizeof more;
+      tables(more);
+    }
+    if (static_cast<std::size_t>(end - at) >= sizeof(std::uint64_t)) tables(1);  // of walls
   }
   return rows;
 }
@@ -710,6 +712,77 @@ TEST(Snapshot, on_as_many_ranks_everything_is_as_it_was_to_the_last_bit) {
     });
     EXPECT_EQ(first.state, second.state) << ranks;
     EXPECT_TRUE(rows_of(first) == rows_of(second)) << ranks;
+  }
+}
+
+/// Tags and loads in the order in which they are told, of all ranks, meshes by their names.
+using LoadsByTag = std::map<std::int64_t, std::vector<std::pair<std::string, std::vector<double>>>>;
+LoadsByTag wall_loads(SmallWorld& w, const WorldParts& parts) {
+  LoadsByTag found;
+  parts.bed.solid.store().for_each([&](const Resident& g) {
+    parts.bed.solid.wall_loads().for_each_of(g.tag, [&](const WallLoad& load) {
+      std::vector<double> numbers = {double(load.element)};
+      numbers.insert(numbers.end(), load.force.data(), load.force.data() + 3);
+      numbers.insert(numbers.end(), load.torque.data(), load.torque.data() + 3);
+      const bool on_mesh = load.mesh != WallLoad::no_mesh;
+      found[g.tag].emplace_back(on_mesh ? w.walls.mesh_names().at(static_cast<std::size_t>(load.mesh)) : "a plane", numbers);
+    });
+  });
+  return found;
+}
+
+TEST(Snapshot, what_granules_press_on_walls_comes_back_where_these_are_as_they_were) {
+  const auto with_meshes = [](int ranks, const std::vector<std::string>& names, double at = -0.5) {
+    SmallDeck deck = ranks_along_x(ranks);
+    for (const std::string& name : names)
+      deck.meshes.push_back({name, {{Vec3(-1, -1, at), Vec3(1, -1, at), Vec3(0, 1, at)}}});
+    return deck;
+  };
+  const std::vector<std::string> names = {"floor", "wall"};
+  for (const int written_on : {1, 2}) {
+    File file;
+    LoadsByTag written;
+    std::mutex mutex;
+    run_on_ranks(with_meshes(written_on, names), [&](SmallWorld& w) {
+      Block block(w, -0.03);
+      std::vector<std::int64_t> stored;
+      block.parts.bed.solid.store().for_each([&](const Resident& g) { stored.push_back(g.tag); });
+      for (const std::int64_t tag : stored) {
+        const int body = block.parts.bed.solid.store().find(tag)->body;
+        std::vector<WallLoad> loads;
+        for (int k = 0; k < tag % 4; ++k)  // none, of one mesh, of two, and of a plane
+          loads.push_back({k == 2 ? WallLoad::no_mesh : k, int(tag) + k, Vec3(0.1 * tag, k, 1), Vec3(k, 0.2, tag)});
+        block.parts.bed.solid.add_wall_loads(tag, body, loads);
+      }
+      const LoadsByTag here = wall_loads(w, block.parts);
+      {
+        const std::lock_guard<std::mutex> lock(mutex);
+        written.insert(here.begin(), here.end());
+      }
+      file.write(w, block.parts);
+    });
+    ASSERT_GE(written.size(), 6u);
+    const auto read_on = [&](const SmallDeck& deck, bool& same) {
+      LoadsByTag read;
+      run_on_ranks(deck, [&](SmallWorld& w) {
+        WorldParts parts(w, sleeping_settings(), 2 * r);
+        file.read(w, parts);
+        const LoadsByTag here = wall_loads(w, parts);
+        const std::lock_guard<std::mutex> lock(mutex);
+        read.insert(here.begin(), here.end());
+        same = parts.snapshot.walls_are_as_they_were();
+      });
+      return read;
+    };
+    for (const int ranks : {1, 2, 3}) {
+      bool same = false;
+      EXPECT_TRUE(read_on(with_meshes(ranks, names), same) == written) << written_on << " " << ranks;
+      EXPECT_TRUE(same);
+      EXPECT_TRUE(read_on(with_meshes(ranks, names, -0.51), same).empty()) << "a wall was moved";
+      EXPECT_FALSE(same);
+      EXPECT_TRUE(read_on(with_meshes(ranks, {"floor"}), same).empty()) << "a wall was taken away";
+      EXPECT_FALSE(same);
+    }
   }
 }
 

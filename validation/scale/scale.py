@@ -36,6 +36,7 @@ from solidcull_runs.laid import culled_files, tiles  # noqa: E402
 from solidcull_runs.laid.floors import Floor  # noqa: E402
 from solidcull_runs.laid.floors import write_floor as write_grid  # noqa: E402
 from solidcull_runs.laid.sources import Source  # noqa: E402
+from solidcull_runs.laid.walls import box_of, number_of  # noqa: E402
 
 impact = examples.load("impact")  # how it measures the crater
 
@@ -147,7 +148,10 @@ def asleep_bed(name):
         def make(part):
             write_floor(floor, sides)
             began = time.monotonic()
-            laid = laid_beds.lay(Source(source["restart"], made_of, PERIOD, MARGIN, Floor(source["floor"])), part, copies, Floor(floor), TOP)
+            of_tiles = Source(source["restart"], made_of, PERIOD, MARGIN, Floor(source["floor"]))
+            walls = number_of((HERE / "asleep.in").read_text(), box_of(sides, 2 * of_tiles.radius, TOP), engine.find_launcher(), HERE,
+                              {"floormesh": floor, "L": sides[0], "W": sides[1]})
+            laid = laid_beds.lay(of_tiles, part, copies, Floor(floor), TOP, walls=walls)
             print(f"  {name}: {laid:,} granules laid in {time.monotonic() - began:.0f} s", flush=True)
         made = {**source, "floor": floor, "sides": sides, "granules": None}
     else:
