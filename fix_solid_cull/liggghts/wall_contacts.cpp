@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 
 #include "atom.h"
 #include "comm.h"
@@ -50,6 +51,18 @@ double gap_to(LAMMPS_NS::PrimitiveWall& wall, const double* place, double radius
   x[(axis + 1) % 3] += beside;
   const double gap_beside = wall.resolveContact(x, radius, to_wall);
   return gap_beside + beside;
+}
+
+/// Which contact models the wall has, of those that Debian's engine knows.
+void add_models(WordSum& sum, FixWallGran& wall) {
+  const std::pair<const char*, std::vector<const char*>> kinds[] = {
+      {"normal", {"hertz", "hooke", "hertz/stiffness", "hooke/stiffness", "hooke/hysteresis"}},
+      {"tangential", {"off", "no_history", "history"}},
+      {"rolling_friction", {"off", "cdt", "epsd", "epsd2", "epsd3", "luding"}},
+      {"cohesion", {"off", "sjkr", "sjkr2", "washino/capillary/viscous", "easo/capillary/viscous"}},
+      {"surface", {"default", "multicontact", "superquadric"}}};
+  for (const auto& [kind, models] : kinds)
+    for (const char* model : models) sum.add(wall.contact_match(kind, model));
 }
 
 void add_text(WordSum& sum, const char* name) {
@@ -182,6 +195,7 @@ std::uint64_t WallContacts::part_of_sum() const {
       one.add(wall->groupbit);
       one.add(wall->is_moving());
       one.add(wall->dnum());
+      add_models(one, *wall);
       if (!wall->is_mesh_wall()) {
         one.add(wall->atom_type_wall());
         for (int corner = 0; corner < 8; ++corner) {  // of a cube around the origin
@@ -203,6 +217,8 @@ std::uint64_t WallContacts::part_of_sum() const {
   for (TriMesh* mesh : meshes_) {
     const bool all_have_it = mesh->sizeGlobal() == 0;  // before the first run sets up
     if (mesh->isMoving() || (all_have_it && comm->me != 0)) continue;
+    // a belt's velocity
+    auto* const surface_moves = mesh->prop().getElementProperty<LAMMPS_NS::MultiVectorContainer<double, 3, 3>>("v");
     for (int t = 0; t < mesh->sizeLocal(); ++t) {
       WordSum one;
       one.add(mesh->id(t));
@@ -210,6 +226,7 @@ std::uint64_t WallContacts::part_of_sum() const {
         double node[3];
         mesh->node(t, k, node);
         for (const double x : node) one.add(x);
+        for (int d = 0; surface_moves && d < 3; ++d) one.add((*surface_moves)(t)[k][d]);
       }
       sum += one.value();
     }

@@ -231,6 +231,45 @@ TEST(Scenes, RestartWhileCulledGoesOnAsIfItHadNotStopped) {
   if (straight.rank() == 0) std::printf("after 1000 steps: %.3g d apart\n", apart / diameter);
 }
 
+/// What stored granules press on walls is in the file, for the walls that it was written with.
+TEST(Scenes, NothingAtWallsComesOutOfARestartFileWhereWallsAreAsTheyWere) {
+  const Bed bed = mesh_bed("walls_then");
+  const std::string fix = "fix cull all solid/cull exterior sleep\n", walls = body(bed);
+  Engine straight;
+  straight.run(read_bed(bed) + fix + "run 1500\nwrite_restart walls_then.asleep.restart\n");
+  const double stored = f(straight, 3);
+  ASSERT_GT(stored, 1100);
+  straight.run("run 100\n");
+  const auto interior = [&](const std::string& skin, const std::string& of_deck, double* floor, double* side) {
+    Engine e;
+    e.run(head(bed) + "read_restart walls_then.asleep.restart\nneighbor " + skin + " bin\nneigh_modify delay 0\n" + of_deck +
+          "fix integr all nve/sphere\nthermo 100000\nthermo_modify norm no\n" + fix + "run 0\n");
+    const double found = f(e, 3);
+    e.run("run 100\n");
+    if (floor) *floor = e.vector("floor", 3);
+    if (side) *side = e.vector("side", 1);
+    expect_all_there(e, "cull", 1300);
+    return found;
+  };
+  double floor = 0, side = 0;
+  EXPECT_EQ(interior("0.0004", walls, &floor, &side), stored);
+  EXPECT_NEAR(floor, straight.vector("floor", 3), 1e-9 * std::abs(floor));
+  EXPECT_NEAR(side, straight.vector("side", 1), 1e-9 * std::abs(side));
+  const auto with = [&](const std::string& then, const std::string& now) {
+    const std::size_t at = walls.find(then);
+    EXPECT_NE(at, std::string::npos) << then;
+    std::string others = walls;
+    return others.replace(at, then.size(), now);
+  };
+  const double fewer = stored - 150;  // at least a side
+  EXPECT_LT(interior("0.0005", walls, nullptr, nullptr), fewer) << "the skin tells what is near a wall";
+  for (const auto& [then, now] : {std::pair<std::string, std::string>{"yplane 0.026", "yplane 0.0260001"},
+                                  {"_floor.stl type 1", "_floor.stl type 1 surface_vel 0.1 0 0"},
+                                  {"_side.stl type 1", "_side.stl type 2"},
+                                  {"peratomtypepair 2 0.5 0.5 0.5 0.5", "peratomtypepair 2 0.4 0.4 0.4 0.4"}})
+    EXPECT_LT(interior("0.0004", with(then, now), nullptr, nullptr), fewer) << now;
+}
+
 TEST(Scenes, FinesPouredOnACoarseBedNeverTouchAnInteriorGranule) {
   Bed bed;
   bed.name = "coarse";
