@@ -142,9 +142,8 @@ void Grounding::press_on_walls() {
     if (!a.stands) continue;
     a.body->bear(a.change, bed_.scales.look_every());
     if (a.change.isZero(0)) continue;
-    for (const auto& [place, e] : bed_.solid.wall_loads().of(a.number)) {
-      if (!(e.share > 0)) continue;
-      const Vec3 extra = e.share * a.change, at = e.force.cross(e.torque) / e.force.squaredNorm();
+    for (const auto& [place, share, at] : bed_.solid.wall_loads().bearing(a.number)) {
+      const Vec3 extra = share * a.change;
       bed_.walls.press(place.first, place.second, extra, at.cross(extra));  // where the element bears its own load
     }
   }

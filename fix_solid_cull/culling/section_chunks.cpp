@@ -61,8 +61,10 @@ std::vector<std::string> lines_of(const WordTable& table) {
   std::string text;
   for (std::size_t r = 0; r < table.rows; ++r) {
     const char c = static_cast<char>(*table.row(r));
-    if (c == '\n') lines.push_back(std::exchange(text, {}));
-    else text += c;
+    if (c == '\n')
+      lines.push_back(std::exchange(text, {}));
+    else
+      text += c;
   }
   return lines;
 }
@@ -410,7 +412,8 @@ void ChunkReader::read_contacts(const WordTable& table) {
 void ChunkReader::index_wall_loads(const WordTable& table) {
   loads_ = &table;
   first_load_ = FlatMap<int>();
-  for (std::size_t r = table.rows; same_walls_ && r-- > 0;) first_load_[static_cast<std::int64_t>(table.row(r)[load_tag])] = static_cast<int>(r);
+  for (std::size_t r = table.rows; same_walls_ && r-- > 0;)
+    first_load_[static_cast<std::int64_t>(table.row(r)[load_tag])] = static_cast<int>(r);
 }
 
 std::vector<WallLoad> ChunkReader::wall_loads_of(std::int64_t tag) const {

@@ -108,8 +108,8 @@ class ChunkReader {
   Head head_;
   std::shared_ptr<Sender> sender_;
   std::vector<int> layout_;
-  std::vector<int> mesh_;      // of the file: its number here
-  FlatMap<int> first_load_;    // of a granule: its row
+  std::vector<int> mesh_;             // of the file: its number here
+  FlatMap<int> first_load_;           // of a granule: its row
   const WordTable* loads_ = nullptr;  // of this chunk
   Parcel parcel_;
   ChunkTables tables_;

@@ -17,7 +17,12 @@ std::vector<std::int64_t> atoms_that_wait(const Bed& bed) {
 }  // namespace
 
 SectionDelivery::SectionDelivery(Bed& bed, Parcels& parcels, SectionReader& section, bool same_walls)
-    : bed_(bed), same_walls_(same_walls), parcels_(parcels), section_(section), atoms_(bed.ranks, atoms_that_wait(bed)), shares_(bed) {}
+    : bed_(bed),
+      same_walls_(same_walls),
+      parcels_(parcels),
+      section_(section),
+      atoms_(bed.ranks, atoms_that_wait(bed)),
+      shares_(bed) {}
 
 SectionCounts SectionDelivery::take_all() {
   parcels_.begin_taking();

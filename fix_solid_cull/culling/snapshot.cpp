@@ -196,8 +196,8 @@ void Snapshot::take_up() {
   SectionReader section(bed_.ranks, file_, identity);
   const bool as_it_was = static_cast<int>(h[ranks]) == bed_.ranks.count &&
                          section.parts().size() == static_cast<std::size_t>(bed_.ranks.count) && stands_as_it_was(section);
-  const SectionCounts taken = as_it_was ? take_as_it_was(section)
-                                       : SectionDelivery(bed_, parcels_, section, same_walls_).take_all();
+  const SectionCounts taken =
+      as_it_was ? take_as_it_was(section) : SectionDelivery(bed_, parcels_, section, same_walls_).take_all();
   check_counts(section.counts(), taken);
 }
 

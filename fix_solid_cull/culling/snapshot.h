@@ -38,8 +38,8 @@ class Snapshot {
   bool waits() const { return !state_.empty(); }
   /// Once there are atoms. InputError for another contact model, or a damaged file. Collective.
   void take_up();
-  /// Whether the walls are those of the file that was taken up: then what stored granules press on them is known. On all ranks the
-  /// same.
+  /// Whether the walls are those of the file that was taken up: then what stored granules press on them is known. On all ranks
+  /// the same.
   bool walls_are_as_they_were() const { return same_walls_; }
   /// Whether a file was taken up since this was asked last.
   bool take_taken_up() { return std::exchange(taken_up_, false); }
@@ -54,9 +54,9 @@ class Snapshot {
   Parcels& parcels_;
   EffectiveGravity& gravity_;
   const Cover& cover_;
-  std::vector<double> state_;   // of the file's head
-  std::string file_;            // that was read
-  bool same_walls_ = false;     // when it was taken up
+  std::vector<double> state_;  // of the file's head
+  std::string file_;           // that was read
+  bool same_walls_ = false;    // when it was taken up
   bool taken_up_ = false;
   bool told_ = false;           // that files of this run hold more than atoms
   std::uint64_t identity_ = 0;  // of the file that is being written

@@ -6,9 +6,10 @@
 namespace solidcull {
 
 void FrozenWallLoads::book(int body, const WallLoad& load, int sign) {
-  Elements& elements = sign > 0 ? bodies_[body] : bodies_.at(body);  // what is taken away must have been there
-  book(elements, load, sign);
-  if (elements.empty()) bodies_.erase(body);
+  Sums& sums = sign > 0 ? bodies_[body] : bodies_.at(body);  // what is taken away must have been there
+  book(sums.elements, load, sign);
+  sums.changed();
+  if (sums.elements.empty()) bodies_.erase(body);
   book(all_, load, sign);
   on_meshes_known_ = false;
 }
@@ -62,9 +63,10 @@ void FrozenWallLoads::move(std::int64_t tag, int from, int to) {
 void FrozenWallLoads::merge(int swallowed, int kept) {
   const auto from = bodies_.find(swallowed);
   if (from == bodies_.end()) return;
-  auto& to = bodies_[kept];
-  for (const auto& element : from->second) {
-    Element& e = to[element.first];
+  Sums& to = bodies_[kept];
+  to.changed();
+  for (const auto& element : from->second.elements) {
+    Element& e = to.elements[element.first];
     e.granules += element.second.granules;
     e.force += element.second.force;
     e.torque += element.second.torque;
@@ -74,12 +76,30 @@ void FrozenWallLoads::merge(int swallowed, int kept) {
 
 void FrozenWallLoads::clear() { *this = FrozenWallLoads(); }
 
-Vec3 FrozenWallLoads::force(int body) const {
-  Vec3 sum = Vec3::Zero();
+const Vec3& FrozenWallLoads::force(int body) const {
+  static const Vec3 none = Vec3::Zero();
   const auto found = bodies_.find(body);
-  if (found != bodies_.end())
-    for (const auto& e : found->second) sum += e.second.force;
-  return sum;
+  if (found == bodies_.end()) return none;
+  const Sums& sums = found->second;
+  if (sums.force_known) return sums.force;
+  sums.force = Vec3::Zero();
+  for (const auto& e : sums.elements) sums.force += e.second.force;
+  sums.force_known = true;
+  return sums.force;
+}
+
+auto FrozenWallLoads::bearing(int body) const -> const std::vector<Bearing>& {
+  static const std::vector<Bearing> none;
+  const auto found = bodies_.find(body);
+  if (found == bodies_.end()) return none;
+  const Sums& sums = found->second;
+  if (sums.bearing_known) return sums.bearing;
+  sums.bearing.clear();
+  for (const auto& [place, e] : sums.elements)
+    if (place.first != WallLoad::no_mesh && e.share > 0)
+      sums.bearing.push_back({place, e.share, e.force.cross(e.torque) / e.force.squaredNorm()});
+  sums.bearing_known = true;
+  return sums.bearing;
 }
 
 auto FrozenWallLoads::on_meshes() const -> const std::vector<OnMesh>& {
@@ -95,19 +115,23 @@ double FrozenWallLoads::weigh(int body, const Vec3& load) {
   double sum = 0;
   const auto found = bodies_.find(body);
   if (found == bodies_.end()) return sum;
-  for (auto& e : found->second) sum += e.second.share = std::abs(e.second.force.dot(load));
+  found->second.bearing_known = false;
+  for (auto& e : found->second.elements) sum += e.second.share = std::abs(e.second.force.dot(load));
   return sum;
 }
 
 void FrozenWallLoads::share_out(int body, double sum) {
   const auto found = bodies_.find(body);
   if (found == bodies_.end()) return;
-  for (auto& e : found->second) e.second.share = sum > 0 ? e.second.share / sum : 0.0;
+  found->second.bearing_known = false;
+  for (auto& e : found->second.elements) e.second.share = sum > 0 ? e.second.share / sum : 0.0;
 }
 
 std::size_t FrozenWallLoads::memory_bytes() const {
   std::size_t bytes = entries_.capacity() * sizeof(Entry) + heads_.memory_bytes();
-  for (const auto& body : bodies_) bytes += body.second.size() * (sizeof(Element) + sizeof(Place) + 32);
+  for (const auto& body : bodies_)
+    bytes +=
+        body.second.elements.size() * (sizeof(Element) + sizeof(Place) + 32) + body.second.bearing.capacity() * sizeof(Bearing);
   return bytes;
 }
 

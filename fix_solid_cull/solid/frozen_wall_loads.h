@@ -43,7 +43,7 @@ class FrozenWallLoads {
 
   bool empty() const { return bodies_.empty(); }
   bool holds(int body) const { return bodies_.count(body) != 0; }
-  Vec3 force(int body) const;  ///< of all walls on the stored granules of this body (N)
+  const Vec3& force(int body) const;  ///< of all walls on the stored granules of this body (N). Each step asks for it
 
   /// Weights by which the walls bear a load on the body (N) in addition to what is frozen: each as much as it bears along that
   /// line already. What pushes against the load pushes more, what pushes along with it less. Returns their sum on this rank;
@@ -54,14 +54,16 @@ class FrozenWallLoads {
   template <class Visit>
   void for_each(Visit visit) const {  // visit(body, mesh, element, sums)
     for (const auto& body : bodies_)
-      for (const auto& e : body.second) visit(body.first, e.first.first, e.first.second, e.second);
+      for (const auto& e : body.second.elements) visit(body.first, e.first.first, e.first.second, e.second);
   }
-  /// Those that bear a body.
-  const Elements& of(int body) const {
-    static const Elements none;
-    const auto found = bodies_.find(body);
-    return found == bodies_.end() ? none : found->second;
-  }
+  struct Bearing {
+    Place place;
+    double share;
+    Vec3 at;  ///< where the element bears what is frozen, from the mesh's point of reference (m)
+  };
+  /// Elements of meshes with a share of what presses on a body from elsewhere: each step asks for them. Valid until something
+  /// changes.
+  const std::vector<Bearing>& bearing(int body) const;
   /// Summed over all bodies; without shares.
   const Elements& of_all() const { return all_; }
   struct OnMesh {
@@ -88,7 +90,16 @@ class FrozenWallLoads {
   void book(int body, const WallLoad& load, int sign);
   static void book(Elements& elements, const WallLoad& load, int sign);
 
-  std::map<int, Elements> bodies_;
+  struct Sums {
+    Elements elements;
+    // of these elements, made anew when a step asks for them
+    mutable Vec3 force = Vec3::Zero();
+    mutable std::vector<Bearing> bearing;
+    mutable bool force_known = false, bearing_known = false;
+
+    void changed() { force_known = bearing_known = false; }
+  };
+  std::map<int, Sums> bodies_;
   Elements all_;  // what a step asks for must not go with the number of bodies
   mutable std::vector<OnMesh> on_meshes_;
   mutable bool on_meshes_known_ = false;

@@ -734,8 +734,7 @@ LoadsByTag wall_loads(SmallWorld& w, const WorldParts& parts) {
 TEST(Snapshot, what_granules_press_on_walls_comes_back_where_these_are_as_they_were) {
   const auto with_meshes = [](int ranks, const std::vector<std::string>& names, double at = -0.5) {
     SmallDeck deck = ranks_along_x(ranks);
-    for (const std::string& name : names)
-      deck.meshes.push_back({name, {{Vec3(-1, -1, at), Vec3(1, -1, at), Vec3(0, 1, at)}}});
+    for (const std::string& name : names) deck.meshes.push_back({name, {{Vec3(-1, -1, at), Vec3(1, -1, at), Vec3(0, 1, at)}}});
     return deck;
   };
   const std::vector<std::string> names = {"floor", "wall"};
