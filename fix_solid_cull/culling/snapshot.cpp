@@ -177,6 +177,7 @@ void Snapshot::take_up() {
   const std::vector<double> state = std::move(state_);
   state_.clear();
   taken_up_ = true;
+  same_walls_ = false;
   const double* const h = state.data();
   if (static_cast<std::size_t>(h[width]) != bed_.solid.contacts().width())
     throw InputError("the restart file holds contact histories of " + std::to_string(static_cast<int>(h[width])) +

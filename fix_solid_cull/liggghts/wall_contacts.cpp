@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <utility>
 
 #include "atom.h"
 #include "comm.h"
@@ -16,7 +15,7 @@
 #include "neighbor.h"
 #include "primitive_wall.h"
 #include "tri_mesh.h"
-#include "word_sum.h"
+#include "wall_sums.h"
 
 namespace solidcull {
 
@@ -51,23 +50,6 @@ double gap_to(LAMMPS_NS::PrimitiveWall& wall, const double* place, double radius
   x[(axis + 1) % 3] += beside;
   const double gap_beside = wall.resolveContact(x, radius, to_wall);
   return gap_beside + beside;
-}
-
-/// Which contact models the wall has, of those that Debian's engine knows.
-void add_models(WordSum& sum, FixWallGran& wall) {
-  const std::pair<const char*, std::vector<const char*>> kinds[] = {
-      {"normal", {"hertz", "hooke", "hertz/stiffness", "hooke/stiffness", "hooke/hysteresis"}},
-      {"tangential", {"off", "no_history", "history"}},
-      {"rolling_friction", {"off", "cdt", "epsd", "epsd2", "epsd3", "luding"}},
-      {"cohesion", {"off", "sjkr", "sjkr2", "washino/capillary/viscous", "easo/capillary/viscous"}},
-      {"surface", {"default", "multicontact", "superquadric"}}};
-  for (const auto& [kind, models] : kinds)
-    for (const char* model : models) sum.add(wall.contact_match(kind, model));
-}
-
-void add_text(WordSum& sum, const char* name) {
-  for (const char* c = name; *c; ++c) sum.add(*c);
-  sum.add(0);
 }
 
 }  // namespace
@@ -170,68 +152,8 @@ std::vector<double> WallContacts::fingerprint() const {
   return f;
 }
 
-std::uint64_t WallContacts::sum_of_materials() const {
-  std::uint64_t sum = 0;
-  for (int i = 0; i < modify->n_fixes_style("property/global"); ++i) {
-    LAMMPS_NS::Fix* fix = modify->find_fix_style("property/global", i);
-    WordSum one;
-    add_text(one, fix->id);
-    if (fix->scalar_flag) one.add(fix->compute_scalar());
-    for (int k = 0; fix->vector_flag && k < fix->size_vector; ++k) one.add(fix->compute_vector(k));
-    for (int r = 0; fix->array_flag && r < fix->size_array_rows; ++r)
-      for (int c = 0; c < fix->size_array_cols; ++c) one.add(fix->compute_array(r, c));
-    sum += one.value();
-  }
-  return sum;
-}
-
 std::uint64_t WallContacts::part_of_sum() const {
-  std::uint64_t sum = 0;
-  if (comm->me == 0) {
-    sum = sum_of_materials();
-    for (FixWallGran* wall : walls_) {
-      WordSum one;
-      add_text(one, wall->id);
-      one.add(wall->groupbit);
-      one.add(wall->is_moving());
-      one.add(wall->dnum());
-      add_models(one, *wall);
-      if (!wall->is_mesh_wall()) {
-        one.add(wall->atom_type_wall());
-        for (int corner = 0; corner < 8; ++corner) {  // of a cube around the origin
-          double x[3], to_wall[3];
-          for (int d = 0; d < 3; ++d) x[d] = corner >> d & 1 ? 1.0 : -1.0;
-          one.add(wall->primitiveWall()->resolveContact(x, 0, to_wall));
-        }
-      }
-      for (int m = 0; wall->is_mesh_wall() && m < wall->n_meshes(); ++m) {
-        FixMeshSurface* fix = wall->mesh_list()[m];
-        add_text(one, fix->id);
-        one.add(fix->groupbit);
-        one.add(fix->atomTypeWall());
-        one.add(fix->triMesh()->isMoving());
-      }
-      sum += one.value();
-    }
-  }
-  for (TriMesh* mesh : meshes_) {
-    const bool all_have_it = mesh->sizeGlobal() == 0;  // before the first run sets up
-    if (mesh->isMoving() || (all_have_it && comm->me != 0)) continue;
-    // a belt's velocity
-    auto* const surface_moves = mesh->prop().getElementProperty<LAMMPS_NS::MultiVectorContainer<double, 3, 3>>("v");
-    for (int t = 0; t < mesh->sizeLocal(); ++t) {
-      WordSum one;
-      one.add(mesh->id(t));
-      for (int k = 0; k < 3; ++k) {
-        double node[3];
-        mesh->node(t, k, node);
-        for (const double x : node) one.add(x);
-        for (int d = 0; surface_moves && d < 3; ++d) one.add((*surface_moves)(t)[k][d]);
-      }
-      sum += one.value();
-    }
-  }
-  return sum;
+  return (comm->me == 0 ? sum_of_materials(*modify) + sum_of_walls(walls_) : 0) + sum_of_triangles(meshes_, comm->me);
 }
 
 std::vector<std::string> WallContacts::names() const {

@@ -41,8 +41,6 @@ class WallContacts : protected LAMMPS_NS::Pointers {
   static void fix_was_made(const char* style);
 
  private:
-  std::uint64_t sum_of_materials() const;
-
   std::vector<LAMMPS_NS::FixWallGran*> walls_;
   std::vector<LAMMPS_NS::TriMesh*> meshes_;  // of the walls, by WallTriangle::mesh
 };
