@@ -15,7 +15,7 @@
 
 #include "interface_mesh_impl.h"
 #include "mesh_files.h"
-#include "whole_file.h"
+#include "vdb_file.h"
 
 namespace solidcull {
 
@@ -258,8 +258,6 @@ void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>&
     throw std::invalid_argument("write_vdb: " + std::to_string(names.size()) + " names for " + std::to_string(meshes.size()) +
                                 " meshes");
   level_set::start();
-  WholeFile out(file);
-  out.close();  // OpenVDB opens the file by its name; that this is possible is known now, or the reason why not
   openvdb::GridCPtrVec grids;
   for (std::size_t n = 0; n < meshes.size(); ++n) {
     const auto named = meshes[n]->impl_->grid->copy();  // shares the tree
@@ -267,12 +265,7 @@ void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>&
     named->setTransform(level_set::transform(meshes[n]->impl_->voxel, meshes[n]->impl_->pose));
     grids.push_back(named);
   }
-  try {
-    openvdb::io::File(out.part()).write(grids);
-  } catch (const std::exception& e) {
-    out.fail(e.what());
-  }
-  out.commit();
+  write_grids(file, grids);
 }
 
 void set_geometry_threads(int n) {

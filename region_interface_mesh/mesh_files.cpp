@@ -132,12 +132,17 @@ void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vec
   write_poly_data(file, piece, time);
 }
 
-PolyDataPiece bed_piece(const BedTable& bed, bool wide) {
+void check_columns(const BedTable& bed) {
   const std::size_t n = bed.radius.size();
   const bool whole = bed.position.size() == 3 * n && bed.velocity.size() == 3 * n && bed.id.size() == n && bed.type.size() == n &&
                      bed.state.size() == n && bed.awake.size() == n && bed.woke.size() == n && bed.body.size() == n &&
                      (bed.spin.empty() || bed.spin.size() == 3 * n);
   if (!whole) throw std::invalid_argument("a bed file: the columns of the bed differ in length");
+}
+
+PolyDataPiece bed_piece(const BedTable& bed, bool wide) {
+  check_columns(bed);
+  const std::size_t n = bed.radius.size();
   std::vector<int> connectivity(n);
   std::iota(connectivity.begin(), connectivity.end(), 0);
 

@@ -36,9 +36,14 @@ struct BedTable {
   std::vector<std::int64_t> body;  // written as Int32 where that holds all values
 };
 
+/// Throws std::invalid_argument where the columns differ in length; the writers do this too.
+void check_columns(const BedTable& bed);
+
 /// VTK XML PolyData of points (one vertex cell each) with point arrays id, radius, pscale (the same), v, w (the spin, if there is
 /// one), type, state, awake, woke, body. time: s. Local.
 void write_bed_vtp(const std::string& file, const BedTable& bed, double time);
+/// OpenVDB file with one grid of points, "points", that has the same arrays but radius, and the metadata "time" (s). Local.
+void write_bed_vdb(const std::string& file, const BedTable& bed, double time);
 /// The same as one piece of several; wide: bodies are numbered alike in all of them. Local.
 PolyDataPiece bed_piece(const BedTable& bed, bool wide);
 

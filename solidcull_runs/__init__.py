@@ -20,6 +20,7 @@ line and compared.
 | `tables` | comparisons as text |
 | `plots` | curves of runs of both kinds |
 | `vtp` | files of `bed` and `mesh`, and their times |
+| `orientations` | how granules are turned, told from the spins in files of `bed` |
 | `cutaways` | pictures of a bed and its interface mesh, cut open |
 | `struck` | what is drawn of a bed that a ball strikes |
 | `kills` | a job on several ranks that is killed, and the newest restart file that it left |

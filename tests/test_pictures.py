@@ -15,8 +15,9 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT))
-from solidcull_runs import cutaways, engine, vtp  # noqa: E402
+from solidcull_runs import cutaways, engine, orientations, vtp  # noqa: E402
 
+POINTS_AS_TEXT = ROOT / "build/tests/unit/points_as_text"
 LAUNCHER = Path(os.environ.get("SOLIDCULL_LAUNCHER", ROOT / "build/liggghts-solidcull")).resolve()
 D, STEP = 0.003, 2e-5  # m (mean), s
 SIDE, TOP = 0.03, 0.12  # m
@@ -130,6 +131,23 @@ class Files(Pictures):
         for (time, name), step in zip(self.listed("bed.vtp.series"), steps):
             self.assertAlmostEqual(time, step * STEP, delta=1e-15)
             self.assertEqual(time, self.read(name)["time"])
+
+    def test_points_of_vdb_are_those_of_vtp(self):
+        for ranks, words in ((1, ""), (2, " seen")):
+            with self.subTest(ranks):
+                self.run_deck(MADE + SLEEP + f" bed 200 bed.*.vtp{words} bed 200 bed.*.vdb{words}\nrun 200\n", ranks)
+                bed = self.read("bed.000000200.vtp")
+                time, names, *rows = subprocess.run([POINTS_AS_TEXT, self.folder / "bed.000000200.vdb"], text=True, check=True, stdout=subprocess.PIPE).stdout.splitlines()
+                self.assertEqual(float(time), bed["time"])
+                self.assertEqual(names, "P awake body id pscale state type v woke")
+                found = np.array([row.split() for row in rows], dtype=float)
+                found = found[found[:, 0].argsort()]
+                places = found[:, 1:4]
+                self.assertLess(abs(places - bed["points"]).max(), 1e-6 * D)
+                columns = [bed[name] for name in ("id", "pscale", "v", "type", "state", "awake", "woke", "body")]
+                self.assertEqual(np.delete(found, (1, 2, 3), axis=1).astype(np.float32).tolist(), np.column_stack(columns).astype(np.float32).tolist())
+                self.assertEqual([name for _, name in self.listed("bed.vdb.series")], ["bed.000000000.vdb", "bed.000000200.vdb"])
+                self.assertEqual(list(self.folder.glob("*.part")), [])
 
     def test_the_list_is_json(self):
         self.run_deck(MADE + SLEEP + " mesh 50 mesh_*.stl\nrun 50\n")
@@ -271,6 +289,51 @@ class InBlender(Pictures):
             at = bed.at(time)
             place, = at["points"][at["id"] == GRANULES]
             self.assertAlmostEqual(place[2] - start[2], -9.81 * time**2 / 2, delta=1e-8)
+
+    def test_what_spins_is_turned(self):
+        """A granule in the air spins evenly: at any time it is turned by its spin times that time."""
+        spin = np.array((60.0, -20.0, 35.0))
+        w = " ".join(f"omega{d} {s}" for d, s in zip("xyz", spin))
+        self.run_deck(MADE.replace("set group new vx", f"set group new {w} vx") + SLEEP + " bed 100 bed.*.vtp spin\nrun 200\n")
+        bed = self.opened()
+        for time in (0.0033, 0.001, 0.004, 0.0):  # also backwards
+            turned, = bed.orientations_at(time)[bed.at(time)["id"] == GRANULES]
+            self.assertLess(abs(turned - orientations.by_vectors(time * spin[None])[0]).max(), 1e-6, time)
+
+    def test_without_spins_it_is_said_how_to_have_them(self):
+        self.run_deck(MADE + SLEEP + " bed 100 bed.*.vtp\nrun 100\n")
+        with self.assertRaisesRegex(ValueError, "write them with the word 'spin'"):
+            self.opened().orientations_at(0)
+
+
+class Turned(unittest.TestCase):
+    def matrix(self, quaternion):
+        rotated = [orientations.times(orientations.times(quaternion[None], np.array([[0, *axis]])), quaternion[None] * (1, -1, -1, -1))[0, 1:] for axis in np.eye(3)]
+        return np.array(rotated).T
+
+    def test_angles_are_those_of_the_quaternion(self):
+        rng = np.random.default_rng(3)
+        for turn in rng.normal(size=(50, 3)):
+            quaternion = orientations.by_vectors(turn[None])
+            x, y, z = orientations.angles(quaternion)[0]
+            about = [orientations.by_vectors(np.array([v])) for v in ((x, 0, 0), (0, y, 0), (0, 0, z))]
+            whole = orientations.times(about[2], orientations.times(about[1], about[0]))[0]
+            np.testing.assert_allclose(self.matrix(whole), self.matrix(quaternion[0]), atol=1e-12)
+
+    def test_a_turn_turns_its_axis_not(self):
+        turn = np.array([0.3, -1.1, 0.7])
+        matrix = self.matrix(orientations.by_vectors(turn[None])[0])
+        np.testing.assert_allclose(matrix @ turn, turn, atol=1e-12)
+        self.assertAlmostEqual(np.trace(matrix), 1 + 2 * np.cos(np.linalg.norm(turn)), places=12)
+        across = np.cross(turn, (1, 0, 0))  # and turns to the left about it
+        self.assertGreater(np.cross(across, matrix @ across) @ turn, 0)
+
+    def test_a_wheel_that_rolls_is_turned_by_its_way_and_one_that_was_not_seen_goes_on(self):
+        wheel = orientations.Orientations()
+        for time, spin, ids in ((0, 0, (5, 7)), (0.1, 2, (5,)), (0.3, 4, (5, 7))):  # rad/s; number 7 is not seen at 0.1 s
+            turned = wheel.follow({"id": np.array(ids), "time": time, "w": np.tile((0.0, spin, 0.0), (len(ids), 1))})
+        for row, angle in zip(turned, (0.1 * 1 + 0.2 * 3, 0.3 * 2)):
+            np.testing.assert_allclose(row, (np.cos(angle / 2), 0, np.sin(angle / 2), 0), atol=1e-12)
 
 
 if __name__ == "__main__":

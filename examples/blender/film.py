@@ -1,7 +1,7 @@
 """A film, or one frame, of a bed on a floor, drawn by Blender's Cycles.
 
     blender -b -P film.py -- out/bed.vtp.series film/ [--frames 1-64] [--size 960x540] [--samples 48] [--speed 1] [--fps 24]
-                             [--look X Y Z] [--from X Y Z] [--turn 0] [--lens 50] [--surface out/mesh.*.vdb]
+                             [--look X Y Z] [--from X Y Z] [--turn 0] [--lens 50] [--stones]
 
 Writes film/0001.png, film/0002.png, ... A frame that is there is not drawn again. `--speed`: seconds of the deck in a second of film.
 `--turn`: degrees that the camera goes around what it looks at.
@@ -31,6 +31,7 @@ def options(words):
     p.add_argument("--look", type=float, nargs=3, default=None, help="what the camera looks at (m); somewhat below the middle of the first frame")
     p.add_argument("--from", dest="eye", type=float, nargs=3, default=None, help="where it stands (m)")
     p.add_argument("--turn", type=float, default=0.0)
+    p.add_argument("--stones", action="store_true", help="copies of rough stones in place of spheres; the files need the word 'spin'")
     p.add_argument("--lens", type=float, default=50.0, help="mm")
     return p.parse_args(words)
 
@@ -86,7 +87,7 @@ def main(o):
     look = o.look or [*((low + high) / 2)[:2], 0.3 * (low + high)[2]]  # what falls comes lower
     reach = float(np.linalg.norm(high - low))
     eye = o.eye or [look[0] + 0.8 * reach, look[1] - 2.7 * reach, look[2] + 1.1 * reach]  # the horizon is above the picture
-    bed.show()
+    bed.show(granules.stones() if o.stones else None)
     floor(0, 60 * reach)
     light("key", [look[0] - 1.9 * reach, look[1] - 0.7 * reach, look[2] + 1.7 * reach], look, 110 * reach**2, 0.5 * reach, (1.0, 0.85, 0.68))
     light("rim", [look[0] + 1.8 * reach, look[1] + 1.8 * reach, look[2] + 1.2 * reach], look, 70 * reach**2, 1.5 * reach, (0.60, 0.77, 1.0))

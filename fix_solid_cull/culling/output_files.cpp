@@ -177,14 +177,15 @@ void OutputFiles::write_meshes(const MeshOutput& output, const std::string& file
 
 // ------------------------------------------------------------------------------------------------------------ the bed
 
-/// By id. Collective.
-BedTable OutputFiles::table(const BedOutput& output) const {
-  struct Row {
-    std::array<float, 3> x, v, w;
-    float radius;
-    int id, type, state, awake, woke;
-    BodyGroups::Key body;
-  };
+struct OutputFiles::Row {
+  std::array<float, 3> x, v, w;
+  float radius;
+  int id, type, state, awake, woke;
+  BodyGroups::Key body;
+};
+
+/// Of this rank, in any order. Collective.
+std::vector<OutputFiles::Row> OutputFiles::rows_of_bed(const BedOutput& output) const {
   const auto narrow = [](const Vec3& a) {
     return std::array<float, 3>{static_cast<float>(a[0]), static_cast<float>(a[1]), static_cast<float>(a[2])};
   };
@@ -210,6 +211,11 @@ BedTable OutputFiles::table(const BedOutput& output) const {
                     static_cast<int>(g.tag), bed_.solid.store().get(g.tag).type, static_cast<int>(GranuleState::interior), 0, 0,
                     bed_.groups.key_of(g.body)});
   });
+  return rows;
+}
+
+/// By id. Local.
+BedTable OutputFiles::table(const BedOutput& output, std::vector<Row> rows) {
   std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.id < b.id; });
   BedTable bed;
   const auto column = [&](auto& values, auto of) {
@@ -239,7 +245,13 @@ BedTable OutputFiles::table(const BedOutput& output) const {
 
 void OutputFiles::write_bed(const BedOutput& output, const std::string& file, double time) {
   const auto timed = report_.time(Part::files);
-  const BedTable bed = table(output);
+  std::vector<Row> rows = rows_of_bed(output);
+  if (file.substr(file.size() - 4) == ".vdb") {
+    if (bed_.ranks.count > 1) rows = bed_.ranks.gather_on_root(rows);
+    on_root("bed", [&] { write_bed_vdb(file, table(output, std::move(rows)), time); });
+    return;
+  }
+  const BedTable bed = table(output, std::move(rows));
   if (bed_.ranks.count == 1)
     on_root("bed", [&] { write_bed_vtp(file, bed, time); });
   else

@@ -41,7 +41,9 @@ class OutputFiles {
   void write_one(const char* keyword, const std::string& pattern, Write write);
   void write_meshes(const MeshOutput& output, const std::string& file, double time);
   void write_bed(const BedOutput& output, const std::string& file, double time);
-  BedTable table(const BedOutput& output) const;
+  struct Row;
+  std::vector<Row> rows_of_bed(const BedOutput& output) const;
+  static BedTable table(const BedOutput& output, std::vector<Row> rows);
   InterfaceMesh skin_of_atoms() const;
   WholeMeshes whole_meshes(Parts& parts, bool skin);
   template <class Write>

@@ -146,7 +146,7 @@ const std::map<std::string, Reader>& readers() {
        [](Values& v, Settings& s) {
          BedOutput o;
          o.every = v.whole("a whole number of steps, 1 or more, and a file name", 1);
-         o.file = v.file({".vtp"}, "a file name that ends with .vtp");
+         o.file = v.file({".vtp", ".vdb"}, "a file name that ends with .vtp or .vdb");
          for (;;)
            if (v.takes("seen"))
              o.seen = true;

@@ -1,0 +1,36 @@
+#include "vdb_file.h"
+
+#include <cerrno>
+#include <cstring>
+#include <exception>
+#include <fstream>
+
+#include "whole_file.h"
+
+namespace solidcull {
+namespace {
+
+/// OpenVDB's own does not look whether the last bytes arrived: where the disc is full, a short file passes for a whole one.
+class Archive : public openvdb::io::Archive {
+ public:
+  void write_to(std::ostream& stream, const openvdb::GridCPtrVec& grids) const { write(stream, grids, /*seekable=*/true); }
+};
+
+}  // namespace
+
+void write_grids(const std::string& file, const openvdb::GridCPtrVec& grids) {
+  WholeFile out(file);
+  out.close();  // that it can be opened is known now, or the reason why not
+  std::ofstream stream(out.part(), std::ios::binary);
+  errno = 0;
+  try {
+    Archive().write_to(stream, grids);
+  } catch (const std::exception& e) {
+    if (errno == 0) out.fail(e.what());
+  }
+  stream.close();
+  if (!stream) out.fail(std::strerror(errno ? errno : EIO));
+  out.commit();
+}
+
+}  // namespace solidcull
