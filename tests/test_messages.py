@@ -255,7 +255,7 @@ class KeywordRefusals(Case):
     STORE = "'exact', 'compact' or 'none'"
     FILE = STEPS + ", and a file name"
     MESH = "a file name that ends with .vdb, .stl or .vtp"
-    BED = "a file name that ends with .vtp"
+    BED = "a file name that ends with .vtp or .vdb"
     LEAST = "a whole number of granules, 1 or more, behind 'least'"
     # words after `solid/cull`: keyword that is named, its value (None: missing), what to give
     AUDIT = "two whole numbers N K: steps from one audit to the next, patches that each wakes"

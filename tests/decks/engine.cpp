@@ -275,8 +275,8 @@ std::string body(const Bed& bed) {
 std::string pouring(const Bed& bed, const std::string& cuts) {
   std::ostringstream s;
   const double rim = bed.periodic ? 0 : 0.002;
-  s << head(bed, cuts) << "region reg block " << -rim << ' ' << bed.side + rim << ' ' << -rim << ' ' << bed.side + rim
-    << " -0.002 0.15\n"
+  s << head(bed, cuts) << "region reg block " << -rim << ' ' << std::max(bed.side + rim, bed.box_length) << ' ' << -rim << ' '
+    << bed.side + rim << " -0.002 0.15\n"
     << "create_box 2 reg\nneighbor 0.0006 bin\nneigh_modify delay 0\n"
     << body(bed)
     << "fix t1 all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.0012\n"

@@ -78,9 +78,10 @@ struct Bed {
   bool cohesion = false;
   bool periodic = false;  // in x and y, instead of side walls
   int granules = 1300;
-  double side = 0.026;  // m, square base
-  double dt = 3e-5;     // s
-  std::string extra;    // lines after the walls
+  double side = 0.026;    // m, square base
+  double box_length = 0;  // m: the box goes on along x to here, where that is more
+  double dt = 3e-5;       // s
+  std::string extra;      // lines after the walls
 
   friend void PrintTo(const Bed& bed, std::ostream* out) { *out << bed.name; }
 };

@@ -550,11 +550,15 @@ TEST(Scenes, ARunThatStartsWithAnEmptyBoxIsCulledToo) {
   Bed bed;
   bed.name = "pour";
   Engine e;
-  e.run(pouring(bed) + "fix cull all solid/cull\nfix visc all viscous 0.002\nrun 12000\nunfix visc\n");
-  expect_all_there(e, "cull", bed.granules);
+  e.run(pouring(bed) + "fix cull all solid/cull\nrun 1\n");
+  const std::size_t poured = e.state().size();  // between many ranks LIGGGHTS finds no place for some
+  ASSERT_GT(poured, 1200u);
+  // it falls before it is damped: the drag would keep it in the air
+  e.run("run 4000\nfix visc all viscous 0.002\nrun 6000\nunfix visc\n");
+  expect_all_there(e, "cull", poured);
   // it still trembles: what spins about a lone contact is stopped by hand
   for (int k = 0; k < 4; ++k) e.run("velocity all set 0 0 0\nset group all omegax 0 omegay 0 omegaz 0\nrun 1500\n");
-  expect_all_there(e, "cull", bed.granules);
+  expect_all_there(e, "cull", poured);
   EXPECT_GT(f(e, 3), 100);
   if (e.rank() == 0) std::printf("%g interior granules\n", f(e, 3));
 }
