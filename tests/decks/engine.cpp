@@ -306,15 +306,20 @@ void make_bed(const std::string& file, const std::string& deck) {
   MPI_Barrier(MPI_COMM_WORLD);
 }
 
-std::string settled(const Bed& bed) {
-  const std::string file = "bed_" + bed.name + ".restart";
-  if (!first_asked_for(file)) return file;
+namespace {
+
+void write_meshes(const Bed& bed) {
+  if (!first_asked_for(bed.name + "_floor.stl")) return;
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   if (rank == 0) {
     write_floor(bed.name + "_floor.stl", bed.side);
     write_side(bed.name + "_side.stl", bed.side);
   }
+  MPI_Barrier(MPI_COMM_WORLD);
+}
+
+std::string settling(const Bed& bed) {
   const auto steps = [&](double at_3e5) { return static_cast<int>(std::lround(at_3e5 * 3e-5 / bed.dt)); };
   std::ostringstream s;
   s << pouring(bed, "1 1 1") << "run " << steps(4000) << "\nunfix ins\n"
@@ -322,7 +327,23 @@ std::string settled(const Bed& bed) {
   // spin about a lone contact has no damping in most models: stopped by hand, until the bed is at rest
   for (int k = 0; k < 8; ++k) s << "set group all omegax 0 omegay 0 omegaz 0\nvelocity all set 0 0 0\nrun " << steps(700) << "\n";
   s << "unfix visc\n";
-  make_bed(file, s.str());
+  return s.str();
+}
+
+}  // namespace
+
+std::string settled(const Bed& bed) {
+  write_meshes(bed);
+  // beds that differ in their names alone are one, which is poured once
+  Bed poured = bed;
+  poured.name = "poured";
+  std::ostringstream name;
+  name << "bed_" << std::hex << std::hash<std::string>()(settling(poured));
+  poured.name = name.str();
+  const std::string file = poured.name + ".restart";
+  if (!first_asked_for(file)) return file;
+  write_meshes(poured);
+  make_bed(file, settling(poured));
   return file;
 }
 
