@@ -292,7 +292,7 @@ const Refusal refusals[] = {
 
     {"bed -1 a.vtp", "keyword 'bed' has the value '-1': give a whole number of steps, 1 or more, and a file name"},
     {"bed", "keyword 'bed' ends too early: give a whole number of steps, 1 or more, and a file name"},
-    {"bed 10", "keyword 'bed' ends too early: give a file name that ends with .vtp"},
+    {"bed 10", "keyword 'bed' ends too early: give a file name that ends with .vtp or .vdb"},
     {"bed 10 a.stl", "keyword 'bed' has the value 'a.stl': give a file name that ends with .vtp or .vdb"},
 
     {"exterior live voxel 1.5 depth 2", "voxel 1.5 is too coarse for depth 2.0: choose voxel <= depth/2"},
