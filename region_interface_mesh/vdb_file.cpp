@@ -4,6 +4,7 @@
 #include <cstring>
 #include <exception>
 #include <fstream>
+#include <string>
 
 #include "whole_file.h"
 
@@ -22,14 +23,16 @@ void write_grids(const std::string& file, const openvdb::GridCPtrVec& grids) {
   WholeFile out(file);
   out.close();  // that it can be opened is known now, or the reason why not
   std::ofstream stream(out.part(), std::ios::binary);
+  std::string reason;
   errno = 0;
   try {
     Archive().write_to(stream, grids);
   } catch (const std::exception& e) {
-    if (errno == 0) out.fail(e.what());
+    reason = e.what();
   }
   stream.close();
-  if (!stream) out.fail(std::strerror(errno ? errno : EIO));
+  if (!stream) reason = std::strerror(errno ? errno : EIO);
+  if (!reason.empty()) out.fail(reason);
   out.commit();
 }
 

@@ -6,6 +6,8 @@ stands it is not turned.
 """
 import numpy as np
 
+from .errors import RunError
+
 
 def times(first, second):
     """Quaternions w x y z, by rows: first the second turn, then the first one."""
@@ -37,7 +39,7 @@ class Orientations:
     def follow(self, bed):
         """The quaternions w x y z of the granules of a file, in its order. bed: as vtp.read() gives it."""
         if "w" not in bed:
-            raise ValueError("the files of `bed` have no spins: write them with the word 'spin' behind the file")
+            raise RunError("the files of `bed` have no spins: write them with the word 'spin' behind the file")
         at = bed["id"]
         lacks = at.max(initial=0) + 1 - len(self.time)
         if lacks > 0:

@@ -15,7 +15,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT))
-from solidcull_runs import cutaways, engine, orientations, vtp  # noqa: E402
+from solidcull_runs import cutaways, engine, errors, orientations, vtp  # noqa: E402
 
 POINTS_AS_TEXT = ROOT / "build/tests/unit/points_as_text"
 LAUNCHER = Path(os.environ.get("SOLIDCULL_LAUNCHER", ROOT / "build/liggghts-solidcull")).resolve()
@@ -302,7 +302,7 @@ class InBlender(Pictures):
 
     def test_without_spins_it_is_said_how_to_have_them(self):
         self.run_deck(MADE + SLEEP + " bed 100 bed.*.vtp\nrun 100\n")
-        with self.assertRaisesRegex(ValueError, "write them with the word 'spin'"):
+        with self.assertRaisesRegex(errors.RunError, "write them with the word 'spin'"):
             self.opened().orientations_at(0)
 
 

@@ -17,6 +17,7 @@ from mathutils import Euler, Vector
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import granules  # noqa: E402
+from solidcull_runs import errors  # noqa: E402
 
 
 def options(words):
@@ -119,4 +120,4 @@ def main(o):
         print(f"frame {frame} of {last}: {len(bed.object.data.vertices):,} granules", flush=True)
 
 
-main(options(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else ["-h"]))
+errors.command("film", lambda: main(options(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else ["-h"])))

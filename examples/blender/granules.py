@@ -29,7 +29,7 @@ class Bed:
         self.frames, self.name, self.speed = vtp.frames(listed), name, speed
         self.times = np.array([time for time, _ in self.frames])
         self.kept = {}  # the two files around the present frame
-        self.turned, self.turned_to = None, -1  # the orientations in the file of that number
+        self.turned, self.turned_to, self.quaternions = None, -1, None  # the orientations in the file of that number
 
     def read(self, k):
         if k not in self.kept:
@@ -43,7 +43,7 @@ class Bed:
             self.turned, self.turned_to = orientations.Orientations(), -1
         while self.turned_to < k:
             self.turned_to += 1
-            self.quaternions = self.turned.follow({**self.read(self.turned_to), "time": self.times[self.turned_to]})
+            self.quaternions = self.turned.follow(self.read(self.turned_to))
         return self.quaternions
 
     def orientations_at(self, time):

@@ -61,9 +61,12 @@ TEST_P(Balance, HandsOnWhatIsCulledWithItsContactsAndWhatItsWallsBear) {
   if (GetParam()) {
     EXPECT_NEAR(culled.variable("load"), stock.variable("load"), 1e-4 * stock.variable("load"));
   }
-  // a few atoms are left, which cannot tell where cuts are due: but these moved, over what is culled
   if (const int parts = culled.lammps()->comm->procgrid[0]; parts > 1) {
-    EXPECT_GT(std::abs(first_cut(culled) - 1.0 / parts), 0.01);
+    EXPECT_GT(std::abs(first_cut(culled) - 1.0 / parts), 0.01) << "cuts moved over what is culled";
+    // most of the work is where the bed is: the cut has gone there. A few atoms are left, too few for more parts than that
+    if (parts <= 4) {
+      EXPECT_LT(first_cut(culled), 0.9 / parts);
+    }
   }
   for (Engine* e : {&stock, &culled}) e->run("unfix cull\nrun 0\n");
   const State a = stock.state(), b = culled.state();

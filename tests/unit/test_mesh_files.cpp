@@ -225,6 +225,7 @@ TEST_F(MeshFiles, say_why_they_cannot_be_written_and_leave_nothing) {
                                    {"vtp", [](const std::string& f) { write_vtp(f, tetrahedron(), {}, 0); }},
                                    {"bed", [](const std::string& f) { write_bed_vtp(f, bed_of(5), 0); }},
                                    {"bed as vdb", [](const std::string& f) { write_bed_vdb(f, bed_of(5), 0); }},
+                                   {"large bed as vdb", [](const std::string& f) { write_bed_vdb(f, bed_of(70001), 0); }},
                                    {"vdb", [&](const std::string& f) { write_vdb(f, {&mesh}, {"body"}); }}};
   fs::create_directory(path("taken"));
   std::ofstream(path("taken") + "/keeps it from being replaced") << "x";
