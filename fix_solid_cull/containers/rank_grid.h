@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <vector>
 
 #include "sphere.h"
@@ -35,6 +36,15 @@ struct RankGrid {
       c[static_cast<std::size_t>(d)] = static_cast<int>(std::upper_bound(inner, last, place[d]) - inner);
     }
     return c;
+  }
+
+  /// The same cell, or one beside it, over corners too.
+  bool are_neighbours(const Cell& a, const Cell& b) const {
+    for (int d = 0; d < 3; ++d) {
+      const int apart = std::abs(a[static_cast<std::size_t>(d)] - b[static_cast<std::size_t>(d)]);
+      if (apart > 1 && !(periods[d] > 0 && apart == cells(d) - 1)) return false;
+    }
+    return true;
   }
 
   /// The cells within `width` of cell `own`, or of one of its nearest periodic images; itself by its images alone. Shifts are in

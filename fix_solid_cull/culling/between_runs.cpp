@@ -65,6 +65,7 @@ void BetweenRuns::take_changes(bool other_walls) {
   p_.closure.begin_run(other_walls);
   change_.make(look_, Phase::beginning);
   p_.shown.give_changes();
+  change_.send_far();
   change_.take_arrivals();
 }
 
@@ -89,6 +90,7 @@ std::int64_t BetweenRuns::restore_all(Phase phase) {
     bed_.wake.ask_all(Woke::deck);
     change_.make(look_, phase);
     p_.shown.give_changes();
+    change_.send_far();
   }
   bed_.memory.give_bins_back();
   if (bed_.solid.store().size() != 0 || bed_.solid.locked() != 0 || bed_.solid.contacts().size() != 0)

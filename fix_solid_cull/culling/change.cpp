@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <string>
+#include <utility>
 
 #include "input_error.h"
 #include "numbers.h"
@@ -52,6 +53,22 @@ bool Change::any_far_out() const {
   return far;
 }
 
+/// For the engine's exchange, which looks one rank far.
+bool Change::any_too_far() const {
+  if (bed_.ranks.count == 1) return false;
+  for (int i = 0; i < bed_.atoms.owned; ++i)
+    if (!bed_.ranks.brings_home(bed_.atoms.place(i))) return true;
+  for (int k = 0; k < bed_.clumps.count(); ++k)
+    if (!bed_.ranks.brings_home(bed_.clumps.centre(k))) return true;
+  return false;
+}
+
+void Change::send_far() {
+  if (!std::exchange(some_far_, false)) return;
+  if (bed_.clumps.possible) bed_.clumps.send_far(bed_.ranks);
+  bed_.atoms.send_far();
+}
+
 auto Change::begin(const Look& look) -> Occasion {
   std::int64_t highest = 0;
   for (int i = 0; i < bed_.atoms.owned; ++i) highest = std::max<std::int64_t>(highest, bed_.atoms.tag[i]);
@@ -83,12 +100,13 @@ auto Change::begin(const Look& look) -> Occasion {
 }
 
 auto Change::see(bool shell_changed, const MembershipChange& c) -> Outcome {
-  enum { changed, leave, sorts, map, bodies, locked, stored, atoms, clumps, numbers };
+  enum { changed, leave, sorts, map, far, bodies, locked, stored, atoms, clumps, numbers };
   std::int64_t all[numbers] = {};
   all[changed] = shell_changed;
   all[leave] = p_.handover.find_leaving(p_.deep.take_away_from_home());
   all[sorts] = static_cast<double>(c.moved()) > sort_share * bed_.atoms.owned;
   all[map] = bed_.atoms.map_is_too_small();
+  all[far] = any_too_far();
   all[bodies] = static_cast<std::int64_t>(bed_.solid.bodies().size());
   all[locked] = static_cast<std::int64_t>(bed_.solid.locked());
   all[stored] = static_cast<std::int64_t>(bed_.solid.store().size());
@@ -96,7 +114,8 @@ auto Change::see(bool shell_changed, const MembershipChange& c) -> Outcome {
   all[clumps] = bed_.clumps.count();
   bed_.ranks.sum(all, numbers);
   if (bed_.clumps.possible) bed_.clumps.publish_count(all[clumps]);
-  return {all[changed] != 0, all[leave] != 0, all[sorts] != 0, all[map] != 0, all[bodies], all[locked], all[stored], all[atoms]};
+  return {all[changed] != 0, all[leave] != 0, all[sorts] != 0, all[map] != 0, all[far] != 0,
+          all[bodies],       all[locked],     all[stored],     all[atoms]};
 }
 
 void Change::make(Look& look, Phase phase) {
@@ -139,6 +158,7 @@ void Change::make(Look& look, Phase phase) {
   follow_box();  // places of stored granules are rounded: the last digit of a border decides who owns what lies on it
   move_cuts();
   const Outcome all = see(shell_changed, c);
+  some_far_ = all.some_far;
   const std::int64_t went = bed_.census.set(all.bodies, all.locked, all.stored);
   if (changes || all.shell_changed) {
     bed_.atoms.publish_counts(-went, all.atoms, all.map_too_small);

@@ -15,6 +15,9 @@ class Change {
 
   /// Wakes all that asked, and culls what the look chose and still rests.
   void make(Look& look, Phase phase);
+  /// What the engine's exchange of atoms would not bring to its owner, but lose, goes there: out of a store that lags behind, of
+  /// clumps longer than a subdomain is wide, or where it was packed anew. Last of all.
+  void send_far();
 
   /// Interface granules may have come from other ranks, or left the box.
   void take_arrivals();
@@ -38,12 +41,13 @@ class Change {
   };
   /// And when it has been made.
   struct Outcome {
-    bool shell_changed = false, some_leave = false, sorts = false, map_too_small = false;
+    bool shell_changed = false, some_leave = false, sorts = false, map_too_small = false, some_far = false;
     std::int64_t bodies = 0, locked = 0, stored = 0, atoms = 0;
   };
   Occasion begin(const Look& look);
   Outcome see(bool shell_changed, const MembershipChange& c);
   bool any_far_out() const;
+  bool any_too_far() const;
   void settle_bodies();
   void follow_box();
   void move_cuts();
@@ -58,6 +62,7 @@ class Change {
 
   Bed& bed_;
   CullingParts& p_;
+  bool some_far_ = false;   // send_far() is due, on all ranks
   bool unsettled_ = false;  // bodies over several ranks, since interface granules were lost
 };
 

@@ -49,8 +49,10 @@ void Culling::begin_run() {
     if (!bed_.run.periodic[d]) periods[d] = 0;
   bed_.solid.set_periods(periods);
   if (p_.snapshot.waits() || bed_.census.something_stored()) {
-    const std::vector<double>& largest = bed_.solid.largest_radius_by_type();
-    bed_.memory.expect_stored(*std::max_element(largest.begin(), largest.end()));
+    const std::vector<double>& by_type = bed_.solid.largest_radius_by_type();
+    double largest = *std::max_element(by_type.begin(), by_type.end());
+    bed_.ranks.largest(&largest, 1);  // a rank may have had none
+    bed_.memory.expect_stored(largest);
   }
   p_.report.membership_changed();  // the deck may have made granules, or deleted some
   p_.files.begin_run();

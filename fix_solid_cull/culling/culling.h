@@ -32,11 +32,14 @@ class Culling {
   void end_setup();     ///< forces are there, but for what other fixes add later
 
   // --- a time step
-  void initial_step();                            ///< takes the loads of a run's setup
-  void integrate();                               ///< bodies move, and carry their interface granules
-  void change() { change_.make(look_, phase_); }  ///< membership: only place where atoms come and go
-  void take_neighbours();                         ///< after the engine's exchange, when ghosts are there
-  void note_new_lists() {                         ///< local
+  void initial_step();  ///< takes the loads of a run's setup
+  void integrate();     ///< bodies move, and carry their interface granules
+  void change() {       ///< membership: only place where atoms come and go
+    change_.make(look_, phase_);
+    change_.send_far();
+  }
+  void take_neighbours();  ///< after the engine's exchange, when ghosts are there
+  void note_new_lists() {  ///< local
     p_.freezing.note_new_lists();
     p_.audit.note_new_lists();
   }

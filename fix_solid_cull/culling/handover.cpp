@@ -49,12 +49,17 @@ bool Handover::follows_another(std::int64_t tag) const {
   return g.clump && !g.has_clump;
 }
 
+/// A sphere may be as far from its clump's home as two spheres of one are from each other.
+std::vector<int> Handover::neighbours() const {
+  return bed_.ranks.neighbours(bed_.clumps.possible ? bed_.clump_spheres.reach() : 0.0);
+}
+
 /// What has gone past all neighbours waits for another change, or is lost with its atom.
 bool Handover::find_leaving(const std::vector<DeepGranules::AwayFromHome>& away) {
   bed_.arrivals.clear();
   leaving_.clear();
   if (bed_.ranks.count == 1) return false;
-  const std::vector<int> neighbours = bed_.ranks.neighbours(0);
+  const std::vector<int> neighbours = this->neighbours();
   const auto goes_to = [&](const Vec3& place) -> Leaving* {
     const int owner = bed_.ranks.owner(place);
     if (owner == bed_.ranks.me || !std::binary_search(neighbours.begin(), neighbours.end(), owner)) return nullptr;
@@ -105,7 +110,7 @@ void Handover::leave() {
 }
 
 void Handover::send_home() {
-  const std::vector<int> neighbours = bed_.ranks.neighbours(0);
+  const std::vector<int> neighbours = this->neighbours();
   for (const int rank : neighbours) {
     const auto to = leaving_.find(rank);
     std::vector<double> numbers;

@@ -51,6 +51,7 @@ class Handover : public BodyFollower {
     double way = 0;  // since then, when last looked (m)
     double lag = 0;  // how far those may be outside already that wait, or have come from other frames without being compared (m)
   };
+  std::vector<int> neighbours() const;
   bool follows_another(std::int64_t tag) const;
   void keep_clumps_whole(const std::vector<DeepGranules::AwayFromHome>& away);
   void forget_clumps_that_left();

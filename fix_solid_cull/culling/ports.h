@@ -22,6 +22,8 @@
 
 namespace solidcull {
 
+class Ranks;
+
 inline Vec3 vec(const double* v) { return Vec3(v[0], v[1], v[2]); }
 inline void set(double* to, const Vec3& v) {
   for (int d = 0; d < 3; ++d) to[d] = v[d];
@@ -149,6 +151,7 @@ class Clumps {
   /// The clumps that this rank moves: how many, and one of them; the one with this number, if it is here.
   virtual int count() const = 0;
   virtual Clump clump(int k) const = 0;
+  virtual Vec3 centre(int k) const = 0;    ///< by which the engine tells its owner (m)
   virtual int find(int number) const = 0;  ///< which of them it is; -1: none
   /// Farthest that spheres of a clump may be apart, centre to centre (m), of any that this rank has ever moved or was told of.
   virtual double largest() const = 0;
@@ -165,6 +168,9 @@ class Clumps {
   virtual void put(const Clump& clump, int sphere) = 0;
   /// Atom i is a sphere of this clump from here on; 0: a granule of its own. Its ghosts do not hear of it.
   virtual void set_clump(int i, int number) = 0;
+  /// The engine's exchange, which goes one rank far, would lose some that are here, or on another rank: they go to the ranks that
+  /// own their centres. Collective.
+  virtual void send_far(const Ranks& ranks) = 0;
   /// Owned atom i is in the periodic image in which it is nearest to owned atom `to`, a sphere of the same clump.
   virtual void join_image(int i, int to) = 0;
 };
@@ -357,6 +363,9 @@ class Ranks {
   virtual int hops() const = 0;
   /// Whether a place is farther outside of this rank's subdomain than granules get between two neighbour builds.
   virtual bool is_far_out(const Vec3& place) const = 0;
+  /// Whether the engine's exchange brings an atom at this place to its owner: this rank, or one beside it, over corners too.
+  /// Local.
+  virtual bool brings_home(const Vec3& place) const = 0;
   /// Rows that ranks exchange may be so from here on, and all ranks are neighbours; all ranks say so alike. Local.
   virtual void expect_far_out(bool on) = 0;
   /// Ranks that may own what has left this rank's subdomain, or (m) is as near to it, ascending; each of them has this one among

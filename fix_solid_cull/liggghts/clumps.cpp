@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <map>
 
 #include "atom.h"
 #include "domain.h"
@@ -71,6 +72,12 @@ int EngineClumps::find(int number) const {
   return rows[number];
 }
 
+Vec3 EngineClumps::centre(int k) const {
+  double x[3];
+  all().x_bound(x, k);
+  return vec(x);
+}
+
 double EngineClumps::largest() const {
   for (int k = 0; k < count(); ++k) largest_ = std::max(largest_, 2 * all().r_bound(k));
   return largest_;
@@ -107,10 +114,41 @@ Clump EngineClumps::take(int number) {
   const int k = find(number);
   if (k < 0) throw InternalError("clump " + std::to_string(number) + " is not on this rank");
   const Clump c = clump(k);
+  remove(k, number);
+  return c;
+}
+
+void EngineClumps::remove(int k, int number) {
   largest_ = std::max(largest_, 2 * all().r_bound(k));
   all().remove_body(k);
   engine::rows_of_clumps(all())[number] = no_row;  // remove_body() names it still where it was the last
-  return c;
+}
+
+int EngineClumps::add(double* row, int number) {
+  LAMMPS_NS::Multisphere& clumps = all();
+  clumps.prop().popElemFromBuffer(row, LAMMPS_NS::OPERATION_COMM_EXCHANGE, dummy, dummy, dummy);
+  const int here = engine::clumps_here(clumps)++;
+  engine::rows_of_clumps(clumps)[number] = here;
+  return here;
+}
+
+void EngineClumps::send_far(const Ranks& ranks) {
+  std::map<int, std::vector<double>> to;
+  numbers_.resize(static_cast<std::size_t>(rest_size));
+  for (int k = count() - 1; k >= 0; --k) {
+    const Vec3 at = centre(k);
+    if (ranks.brings_home(at)) continue;
+    all().prop().pushElemToBuffer(k, numbers_.data(), LAMMPS_NS::OPERATION_COMM_EXCHANGE, dummy, dummy, dummy);
+    std::vector<double>& rows = to[ranks.owner(at)];
+    rows.insert(rows.end(), numbers_.begin(), numbers_.end());
+    remove(k, static_cast<int>(numbers_[static_cast<std::size_t>(at_.number)]));
+  }
+  for (auto& [rank, rows] : ranks.deliver(to))
+    for (std::size_t at = 0; at < rows.size(); at += static_cast<std::size_t>(rest_size)) {
+      const int number = static_cast<int>(rows[at + static_cast<std::size_t>(at_.number)]);
+      keep_number(number);
+      add(&rows[at], number);
+    }
 }
 
 /// Its centre is where its spheres say, in the periodic image that their image flags name. A fix that came while it was culled
@@ -143,10 +181,7 @@ void EngineClumps::put(const Clump& c, int sphere) {
   std::copy_n(row + at_.inertia, 3, inertia);
   std::copy_n(row + at_.angular_momentum, 3, turning);
   MathExtra::angmom_to_omega(turning, axes[0], axes[1], axes[2], inertia, row + at_.spin);
-  LAMMPS_NS::Multisphere& clumps = all();
-  clumps.prop().popElemFromBuffer(row, LAMMPS_NS::OPERATION_COMM_EXCHANGE, dummy, dummy, dummy);
-  const int here = engine::clumps_here(clumps)++;
-  engine::rows_of_clumps(clumps)[c.number] = here;
+  const int here = add(row, c.number);
   if (static_cast<int>(c.rest.size()) >= rest_size) return;
   for_each_column([&](LAMMPS_NS::ContainerBase& column, int place, int) {
     if (place >= static_cast<int>(c.rest.size())) column.setToDefault(here);

@@ -22,6 +22,7 @@ class EngineClumps : public Clumps, protected LAMMPS_NS::Pointers {
 
   int count() const override;
   Clump clump(int k) const override;
+  Vec3 centre(int k) const override;
   int find(int number) const override;
   double largest() const override;
   void know_largest(double apart) override { largest_ = std::max(largest_, apart); }
@@ -30,6 +31,7 @@ class EngineClumps : public Clumps, protected LAMMPS_NS::Pointers {
   Clump take(int number) override;
   void put(const Clump& clump, int sphere) override;
   void set_clump(int i, int number) override;
+  void send_far(const Ranks& ranks) override;
   void join_image(int i, int to) override;
   void keep_number(int number) override;
 
@@ -42,6 +44,9 @@ class EngineClumps : public Clumps, protected LAMMPS_NS::Pointers {
   template <class Visit>
   void for_each_column(Visit visit) const;
   void find_columns();
+  void remove(int k, int number);
+  /// A packed row; returns which it is now.
+  int add(double* row, int number);
   LAMMPS_NS::Multisphere& all() const;
 
   LAMMPS_NS::FixMultisphere* fix_ = nullptr;

@@ -174,12 +174,21 @@ bool EngineRanks::subdomains_changed() const {
   return now.cuts != grid_.cuts || now.periods != grid_.periods;
 }
 
-int EngineRanks::owner(const Vec3& place) const {
+RankGrid::Cell EngineRanks::cell_of(const Vec3& place) const {
   double x[3];
   set(x, place);
   domain->remap(x);
-  const RankGrid::Cell cell = grid_.cell_of(vec(x));
+  return grid_.cell_of(vec(x));
+}
+
+int EngineRanks::owner(const Vec3& place) const {
+  const RankGrid::Cell cell = cell_of(place);
   return comm->grid2proc[cell[0]][cell[1]][cell[2]];
+}
+
+bool EngineRanks::brings_home(const Vec3& place) const {
+  const bool here = (place.array() >= lo_.array()).all() && (place.array() < hi_.array()).all();
+  return here || grid_.are_neighbours({comm->myloc[0], comm->myloc[1], comm->myloc[2]}, cell_of(place));
 }
 
 Box EngineRanks::own() const { return {vec(domain->sublo), vec(domain->subhi)}; }

@@ -45,6 +45,7 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
   void move_cuts(const std::array<std::vector<double>, 3>& to) override;
   int hops() const override;
   bool is_far_out(const Vec3& place) const override;
+  bool brings_home(const Vec3& place) const override;
   void expect_far_out(bool on) override { far_out_ = on; }
   std::vector<int> neighbours(double width) const override;
   const std::vector<Vec3>& image_shifts() const override { return shifts_; }
@@ -64,6 +65,7 @@ class EngineRanks : public Ranks, protected LAMMPS_NS::Pointers {
     MPI_Request request;
   };
   RankGrid grid() const;
+  RankGrid::Cell cell_of(const Vec3& place) const;
   const std::vector<Partner>& partners(double reach) const;
   const std::vector<Partner>& partners_within(double width) const;
   void forget_sent() const;

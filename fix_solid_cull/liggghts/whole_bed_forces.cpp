@@ -95,6 +95,9 @@ WholeBedForces::~WholeBedForces() {
   int unused = 0;
   auto* const lists_are_newer = static_cast<int*>(force->pair->extract("computeflag", unused));
   if (lists_are_newer) *lists_are_newer = 0;  // histories are with the atoms, as they were
+  // the next run may search by other bins, at the same step: lists of meshes keep the bins of each element until a run ends
+  for (int f = 0; f < modify->nfix; ++f)
+    if (is(modify->fix[f], "neighlist/mesh")) modify->fix[f]->post_run();
   fix_.take_contacts_back();
 }
 

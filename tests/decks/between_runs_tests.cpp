@@ -98,6 +98,10 @@ TEST_P(BetweenRuns, ActOnAllGranules) {
   never.run("run 0\n");
   culled.run("unfix cull\nrun 0\n");
   const State fa = never.state(), fb = culled.state();
+  if (fa.size() < a.size()) {
+    EXPECT_EQ(fb.size(), a.size());
+    GTEST_SKIP() << "LIGGGHTS loses what a command has moved farther than to the next rank";
+  }
   ASSERT_EQ(fb.size(), fa.size());
   if (sequence.left == Sequence::Left::same_tags) {
     const double contact_force = 13 * fa.begin()->second.mass * 9.81;

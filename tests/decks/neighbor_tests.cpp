@@ -135,7 +135,9 @@ TEST_P(Neighbours, AreThoseThatTheEngineFindsInItsOrder) {
   EXPECT_EQ(anywhere[kDifferent], 0) << first;
   // what was compared
   EXPECT_GT(anywhere[kPairs], 1000);
-  EXPECT_EQ(anywhere[kOctaves], mix.octaves);
+  if (own.ranks() <= 4) {  // in narrow slabs LIGGGHTS inserts none of the largest
+    EXPECT_EQ(anywhere[kOctaves], mix.octaves);
+  }
   const bool histories = mix.contact.find("no_history") == std::string::npos, images = mix.periodic || own.ranks() > 1;
   EXPECT_GE(anywhere[kTouching], histories ? 100 : 0);
   EXPECT_GE(anywhere[kGhosts], images ? 50 : 0);

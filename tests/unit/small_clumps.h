@@ -17,6 +17,7 @@ class SmallClumps : public Clumps {
   explicit SmallClumps(SmallWorld& world);
   int count() const override { return static_cast<int>(rows_.size()); }
   Clump clump(int k) const override { return rows_.at(static_cast<std::size_t>(k)); }
+  Vec3 centre(int k) const override { return clump(k).lies.centre; }
   int find(int number) const override;
   double largest() const override;
   void know_largest(double apart) override;
@@ -27,6 +28,7 @@ class SmallClumps : public Clumps {
   void put(const Clump& clump, int sphere) override;
   void set_clump(int i, int number) override;
   void join_image(int, int) override {}
+  void send_far(const Ranks&) override {}  // rows go to any rank here
 
   // --- the small engine's side. Collective, but for what says otherwise.
   /// Its spheres have the tags from `first_tag` on. Returns its number, the next one.

@@ -280,6 +280,7 @@ class SmallRanks : public Ranks {
   Box subdomain(int rank) const;
   int hops() const override;
   bool is_far_out(const Vec3&) const override { return false; }  // rows go to all ranks here
+  bool brings_home(const Vec3&) const override { return true; }  // and atoms
   void expect_far_out(bool) override {}
   std::vector<int> neighbours(double width) const override;
   const std::vector<Vec3>& image_shifts() const override { return shifts_; }

@@ -30,6 +30,17 @@ TEST(RankGrid, of_a_thousand_ranks_has_26_partners_at_most) {
   }
 }
 
+TEST(RankGrid, cells_beside_each_other_are_neighbours_over_corners_and_periodic_sides) {
+  for (const bool periodic : {false, true}) {
+    const RankGrid g = grid_of(8, 1, 2, periodic);
+    EXPECT_TRUE(g.are_neighbours({3, 0, 0}, {3, 0, 0}));
+    EXPECT_TRUE(g.are_neighbours({3, 0, 0}, {4, 0, 1}));
+    EXPECT_FALSE(g.are_neighbours({3, 0, 0}, {5, 0, 0}));
+    EXPECT_EQ(g.are_neighbours({0, 0, 0}, {7, 0, 1}), periodic);
+    EXPECT_FALSE(g.are_neighbours({1, 0, 0}, {7, 0, 1}));
+  }
+}
+
 TEST(RankGrid, each_place_is_in_one_cell) {
   for (const bool periodic : {false, true}) {
     const RankGrid g = grid_of(4, 3, 2, periodic);

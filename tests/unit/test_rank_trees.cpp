@@ -70,6 +70,7 @@ class Crowd {
     double thinnest() const override { return 0; }
     void move_cuts(const std::array<std::vector<double>, 3>&) override {}
     bool is_far_out(const Vec3&) const override { return false; }
+    bool brings_home(const Vec3&) const override { return true; }
     void expect_far_out(bool) override {}
     std::vector<int> neighbours(double) const override { return {}; }
     const std::vector<Vec3>& image_shifts() const override {
