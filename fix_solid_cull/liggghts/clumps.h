@@ -27,7 +27,7 @@ class EngineClumps : public Clumps, protected LAMMPS_NS::Pointers {
   double largest() const override;
   void know_largest(double apart) override { largest_ = std::max(largest_, apart); }
   int highest_number() const override;
-  void publish_count(std::int64_t all) override;
+  void publish_count(std::int64_t everywhere) override;
   Clump take(int number) override;
   void put(const Clump& clump, int sphere) override;
   void set_clump(int i, int number) override;

@@ -272,10 +272,17 @@ std::string body(const Bed& bed) {
   return s.str();
 }
 
+/// SOLIDCULL_BOX in the environment, such as 0.4: boxes go on along x to there (m), so that there are far more bins than atoms.
+double empty_room() {
+  const char* const asked = std::getenv("SOLIDCULL_BOX");
+  return asked ? std::atof(asked) : 0.0;
+}
+
 std::string pouring(const Bed& bed, const std::string& cuts) {
   std::ostringstream s;
   const double rim = bed.periodic ? 0 : 0.002;
-  s << head(bed, cuts) << "region reg block " << -rim << ' ' << std::max(bed.side + rim, bed.box_length) << ' ' << -rim << ' '
+  s << head(bed, cuts) << "region reg block " << -rim << ' '
+    << std::max(bed.side + rim, bed.periodic ? 0.0 : std::max(bed.box_length, empty_room())) << ' ' << -rim << ' '
     << bed.side + rim << " -0.002 0.15\n"
     << "create_box 2 reg\nneighbor 0.0006 bin\nneigh_modify delay 0\n"
     << body(bed)
