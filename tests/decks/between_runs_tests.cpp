@@ -82,7 +82,7 @@ TEST_P(BetweenRuns, ActOnAllGranules) {
     EXPECT_EQ(largest_difference(a, b, &Granule::v), 0.0);
     EXPECT_EQ(largest_difference(a, b, &Granule::omega), 0.0);
     std::vector<std::string> groups = sequence.groups;
-    groups.push_back("everyone");
+    groups.emplace_back("everyone");
     expect_same_groups(never, culled, groups);
   }
 

@@ -71,7 +71,7 @@ double SmallClumps::largest() const {
   return largest_;
 }
 
-void SmallClumps::know_largest(double far) { largest_ = std::max(largest_, far); }
+void SmallClumps::know_largest(double apart) { largest_ = std::max(largest_, apart); }
 
 Clump SmallClumps::take(int number) {
   const int k = find(number);
