@@ -76,6 +76,11 @@ void Bed::arrives(int i, const SolidBodies::Place& at) {
   }
 }
 
+void Bed::send_far() {
+  if (clumps.possible) clumps.send_far(ranks);
+  atoms.send_far();
+}
+
 void Bed::see_largest_radius() {
   double all[2] = {largest_radius_here(*this), clumps.largest()};
   ranks.largest(all, 2);

@@ -28,6 +28,8 @@ struct Bed : BedState, BodyFollower {
   /// Interface granule i leaves this rank, or has come to stand in a body of it.
   void leaves_rank(int i);
   void arrives(int i, const SolidBodies::Place& at);
+  /// All atoms and clumps go to the ranks that own their places, however far. Atoms have other indices then. Collective.
+  void send_far();
   /// The largest radius is known on all ranks. Collective; a change does it, too.
   void see_largest_radius();
   /// All that wakes on this rank, `all` if some rank has asked so. Collective.

@@ -54,7 +54,7 @@ bool Change::any_far_out() const {
 }
 
 /// For the engine's exchange, which looks one rank far.
-bool Change::any_too_far() const {
+bool Change::any_lost_on_the_way() const {
   if (bed_.ranks.count == 1) return false;
   for (int i = 0; i < bed_.atoms.owned; ++i)
     if (!bed_.ranks.brings_home(bed_.atoms.place(i))) return true;
@@ -64,9 +64,7 @@ bool Change::any_too_far() const {
 }
 
 void Change::send_far() {
-  if (!std::exchange(some_far_, false)) return;
-  if (bed_.clumps.possible) bed_.clumps.send_far(bed_.ranks);
-  bed_.atoms.send_far();
+  if (std::exchange(some_far_, false)) bed_.send_far();
 }
 
 auto Change::begin(const Look& look) -> Occasion {
@@ -106,7 +104,7 @@ auto Change::see(bool shell_changed, const MembershipChange& c) -> Outcome {
   all[leave] = p_.handover.find_leaving(p_.deep.take_away_from_home());
   all[sorts] = static_cast<double>(c.moved()) > sort_share * bed_.atoms.owned;
   all[map] = bed_.atoms.map_is_too_small();
-  all[far] = any_too_far();
+  all[far] = any_lost_on_the_way();
   all[bodies] = static_cast<std::int64_t>(bed_.solid.bodies().size());
   all[locked] = static_cast<std::int64_t>(bed_.solid.locked());
   all[stored] = static_cast<std::int64_t>(bed_.solid.store().size());

@@ -47,7 +47,7 @@ class Change {
   Occasion begin(const Look& look);
   Outcome see(bool shell_changed, const MembershipChange& c);
   bool any_far_out() const;
-  bool any_too_far() const;
+  bool any_lost_on_the_way() const;
   void settle_bodies();
   void follow_box();
   void move_cuts();

@@ -349,9 +349,7 @@ void ShownBed::give_changes() {
   bool far = false;
   for (int i = 0; i < atoms.owned && !far && bed_.ranks.count > 1; ++i) far = !bed_.ranks.owns(atoms.place(i));
   bed_.census.publish_atoms(0);
-  if (!bed_.ranks.any(far)) return;
-  if (bed_.clumps.possible) bed_.clumps.send_far(bed_.ranks);
-  bed_.atoms.send_far();
+  if (bed_.ranks.any(far)) bed_.send_far();
 }
 
 /// It keeps its contacts.

@@ -95,7 +95,7 @@ WholeBedForces::~WholeBedForces() {
   int unused = 0;
   auto* const lists_are_newer = static_cast<int*>(force->pair->extract("computeflag", unused));
   if (lists_are_newer) *lists_are_newer = 0;  // histories are with the atoms, as they were
-  // the next run may search by other bins, at the same step: lists of meshes keep the bins of each element until a run ends
+  // as a run leaves them: lists of meshes keep the bins of each element, and the next run may have others at the same step
   for (int f = 0; f < modify->nfix; ++f)
     if (is(modify->fix[f], "neighlist/mesh")) modify->fix[f]->post_run();
   fix_.take_contacts_back();

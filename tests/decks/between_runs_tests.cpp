@@ -24,6 +24,13 @@ struct Sequence {
   friend void PrintTo(const Sequence& s, std::ostream* out) { *out << s.name; }
 };
 
+State those_of(const State& all, const State& these) {
+  State found;
+  for (const auto& [tag, granule] : all)
+    if (these.count(tag)) found.emplace(tag, granule);
+  return found;
+}
+
 class BetweenRuns : public testing::TestWithParam<Sequence> {};
 
 constexpr double diameter = 0.0026;
@@ -97,10 +104,13 @@ TEST_P(BetweenRuns, ActOnAllGranules) {
   const double after = interior(culled);
   never.run("run 0\n");
   culled.run("unfix cull\nrun 0\n");
-  const State fa = never.state(), fb = culled.state();
-  if (fa.size() < a.size()) {
-    EXPECT_EQ(fb.size(), a.size());
-    GTEST_SKIP() << "LIGGGHTS loses what a command has moved farther than to the next rank";
+  const State fa = never.state();
+  State fb = culled.state();
+  // LIGGGHTS loses what a command has moved farther than to the next rank; the fix does not. The others are compared
+  const bool some_lost = never.ranks() > 4 && fa.size() < a.size();
+  if (some_lost) {
+    ASSERT_EQ(fb.size(), a.size());
+    fb = those_of(fb, fa);
   }
   ASSERT_EQ(fb.size(), fa.size());
   if (sequence.left == Sequence::Left::same_tags) {
@@ -115,7 +125,9 @@ TEST_P(BetweenRuns, ActOnAllGranules) {
   // and goes on
   never.run("run 20\n");
   culled.run("run 20\n");
-  const State ga = never.state(), gb = culled.state();
+  const State ga = never.state();
+  State gb = culled.state();
+  if (some_lost) gb = those_of(gb, ga);
   EXPECT_EQ(gb.size(), ga.size());
   if (sequence.left == Sequence::Left::same_tags && ga.size() == gb.size())
     EXPECT_LE(largest_difference(ga, gb, &Granule::x), 1e-9 * diameter);

@@ -126,27 +126,6 @@ TEST(AMeshLoadInAFormula, LeavesTheBedAsleep) {
   EXPECT_GT(e.lammps()->atom->natoms, atoms + 300);
 }
 
-/// Where few atoms are left in a large box the engine searches by wider bins in runs, and meshes keep the bins of their elements:
-/// contacts at walls are there after a formula has asked for forces.
-TEST(FormulasInALargeBox, LeaveWhatLiesAtMeshesItsContacts) {
-  Bed large = bed();
-  large.name = "formulas_large";
-  large.box_length = 0.4;
-  Engine never, culled;
-  for (Engine* e : {&never, &culled}) e->run(read_bed(large) + (e == &culled ? fix_line : "") + stress + "run 100\nrun 0\n");
-  ASSERT_GT(culled.vector("cull", 3), 300);
-  for (int k = 0; k < 3; ++k) {
-    const double there = value(never, "c_sum[3]"), here = value(culled, "c_sum[3]");
-    EXPECT_NEAR(here, there, 1e-12 * std::abs(there)) << "asked for the " << k + 1 << "th time";
-    for (Engine* e : {&never, &culled}) e->run("run 0\n");
-  }
-  EXPECT_GT(culled.vector("cull", 3), 300);
-  culled.run("unfix cull\n");
-  for (Engine* e : {&never, &culled}) e->run("run 20\n");
-  EXPECT_LE(largest_difference(never.state(), culled.state(), &Granule::v), 1e-9);
-  EXPECT_EQ(never.histories().size(), culled.histories().size());
-}
-
 TEST(OtherContacts, MayComeBetweenRunsWhileGranulesAreCulled) {
   // filled without tangential history, tested with it
   const std::string without = "model hertz tangential no_history", with = "model hertz tangential history";
