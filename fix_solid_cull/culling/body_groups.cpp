@@ -115,7 +115,8 @@ void BodyGroups::settle_those_here() {
 template <class TakesPart>
 void BodyGroups::settle_those_over_ranks(TakesPart takes_part) {
   struct Part {
-    double mass, grounded_mass;
+    double mass, grounded_mass, felt_mass;  // the last: of what knows what it felt
+    Triple felt;                            // times that mass, world frame
     Triple centre, momentum, angular_momentum;
     std::array<double, 9> inertia;
     std::array<bool, 3> tied;
@@ -141,6 +142,8 @@ void BodyGroups::settle_those_over_ranks(TakesPart takes_part) {
     Part& row = parts[at];
     row.set(sum);
     row.grounded_mass = body->grounded_mass;
+    row.felt_mass = body->felt_known ? body->mass.mass : 0.0;
+    row.felt = triple(row.felt_mass * body->pose.turned_to_world(body->felt));
     for (int d = 0; d < 3; ++d) row.tied[d] = body->spans[d] || p.tied[d];
     row.grounded = body->grounded;
     row.held = body->mass.held != 0;
@@ -156,6 +159,8 @@ void BodyGroups::settle_those_over_ranks(TakesPart takes_part) {
           whole.set(sum);
         }
         whole.grounded_mass += other.grounded_mass;
+        whole.felt_mass += other.felt_mass;
+        for (int d = 0; d < 3; ++d) whole.felt[d] += other.felt[d];
         for (int d = 0; d < 3; ++d) whole.tied[d] = whole.tied[d] || other.tied[d];
         whole.grounded = whole.grounded || other.grounded;
         whole.held = whole.held || other.held;
@@ -167,8 +172,9 @@ void BodyGroups::settle_those_over_ranks(TakesPart takes_part) {
     if (whole.mass == 0) continue;  // spheres of clumps whose mass has been lost
     const int number = trees_.parts()[p].body;
     bed_.solid.ground(number, whole.grounded && whole.held);
-    bed_.solid.body(number).settle_as_part(whole.sum(), SolidBody::free_axes(whole.tied), trees_.parts()[p].shift,
-                                           whole.grounded_mass / whole.mass);
+    SolidBody& body = bed_.solid.body(number);
+    if (whole.felt_mass > 0) body.feel(body.pose.turned_to_frame(vec(whole.felt) / whole.felt_mass));
+    body.settle_as_part(whole.sum(), SolidBody::free_axes(whole.tied), trees_.parts()[p].shift, whole.grounded_mass / whole.mass);
   }
 }
 

@@ -130,9 +130,11 @@ void SolidBody::stand_as(const SolidBody& from, double granule_mass) {
 
 void SolidBody::settle_as_part(const RigidSum& whole, const FreeAxes& free, const Vec3& shift, double grounded_share) {
   if (grounded) grounded_mass = grounded_share * mass.mass;
+  const Vec3 before = motion.velocity();
   motion = RigidMotion(whole, free);
   motion.shift(-shift);
   if (grounded) motion.stop();
+  velocity_then += motion.velocity() - before;
   take_twist();
   changed = false;
 }
@@ -186,8 +188,9 @@ const SolidBody& SolidBodies::body(int number) const {
 }
 
 /// The mean acceleration is that of the centre of mass: where the centre is another one now, the velocity that it began with is
-/// too.
+/// too. Of a body over ranks nobody knows it before it is settled.
 void SolidBodies::centre_moved(SolidBody& body, const Vec3& from) {
+  if (body.spanned) return;
   const Vec3 to = body.pose.to_world(body.mass.centre());
   body.velocity_then += body.twist.spin.cross(to - from);
 }

@@ -159,10 +159,13 @@ struct SolidBody {
   void take_twist() { twist = motion.twist(); }
 
   // after its granules changed
-  /// Whether it is a part of a body over several ranks now; where that is new its motion is to be settled.
+  /// Whether it is a part of a body over several ranks now; where that is new its motion is to be settled, and what it felt as
+  /// the other one does not count.
   void note_span(bool spans_ranks) {
-    changed = changed || spanned != spans_ranks;
+    if (spanned == spans_ranks) return;
     spanned = spans_ranks;
+    changed = true;
+    step_then = -1;
   }
   void settle();  ///< its own granules are all there is
   /// It is a part of this whole, `grounded_share` of which was grounded of itself; shift: from this rank's image to the one in

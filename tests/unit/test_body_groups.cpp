@@ -132,6 +132,44 @@ TEST(BodyGroups, each_body_is_counted_once_over_all_ranks_and_ghosts_know_their_
   });
 }
 
+TEST(BodyGroups, parts_feel_one_gravity_the_mean_by_mass_of_those_that_know_theirs) {
+  for (const bool known : {true, false})
+    run_on_ranks(ranks_along_x(2), [&](SmallWorld& w) {
+      Row row(w, some_velocities(4), -2.5 * apart);  // three on rank 0, one on rank 1
+      const bool first = w.ranks.me == 0;
+      SolidBody& body = row.parts.bed.solid.bodies_in_motion().begin()->second;
+      ASSERT_EQ(body.mass.count, first ? 3 : 1);
+      body.feel(Vec3(0, 0, first ? -9 : -11));
+      body.felt_known = first || known;
+      row.parts.bed.groups.settle();
+      EXPECT_TRUE(body.felt_known);
+      EXPECT_LT((body.felt - Vec3(0, 0, known ? -9.5 : -9)).norm(), 1e-14);
+    });
+}
+
+TEST(BodyGroups, what_comes_to_a_part_and_leaves_it_accelerates_nothing) {
+  run_on_ranks(ranks_along_x(2), [](SmallWorld& w) {
+    Row row(w, std::vector<Vec3>(4, Vec3(0, 1e-3, 0)), -1.5 * apart);
+    SolidBody& body = row.parts.bed.solid.bodies_in_motion().begin()->second;
+    const auto expect_no_acceleration = [&](const Vec3& before) {
+      EXPECT_NEAR((body.motion.velocity() - before).norm(), 1e-3, 1e-12) << "the test shows nothing";
+      body.end_window(1e-3);
+      EXPECT_LT(body.acceleration.norm(), 1e-12);
+    };
+    body.begin_window(0);
+    Vec3 before = body.motion.velocity();
+    row.add(5, {Vec3(0, 6e-3, 0)}, 2.5 * apart, 0);  // on rank 1, faster than the row
+    row.lock();
+    expect_no_acceleration(before);
+    body.begin_window(0);
+    before = body.motion.velocity();
+    Wakes one;  // it goes on with its own velocity
+    one.balls.push_back({Vec3(2.5 * apart, 0, 0), 0.5 * r});
+    row.parts.change(one, {});
+    expect_no_acceleration(before);
+  });
+}
+
 TEST(BodyGroups, ranks_that_hold_no_part_take_part_in_what_is_collective) {
   run_on_ranks(ranks_along_x(3), [](SmallWorld& w) {
     Row row(w, some_velocities(4), -0.04);  // across the border at -0.02; rank 2 has nothing
