@@ -219,11 +219,12 @@ class Parts(unittest.TestCase):
             with self.assertRaisesRegex(golden.GoldenError, "no UUID"):
                 hashed(b" BDV" + bytes(80))
 
-    def test_what_the_fix_says_at_the_end_of_a_run_is_no_result(self):
+    def test_what_seconds_have_gone_into_and_the_end_of_a_run_are_no_result(self):
         screen = ("fix cull solid/cull: version 0.1.0\n"
                   "fix cull solid/cull: the deck has no fix gravity\n"
                   "fix cull solid/cull: 400 steps, 343 granules\n  exterior      = 20 (5.8 %) on average\n"
                   "fix cull solid/cull: 1 exterior, 2 interface, 3 interior granules in 1 bodies; culled 5, restored 0\n"
+                  "fix cull solid/cull: if it goes on like this, the run will be about as much work as without it\n"
                   "fix cull solid/cull: 0.2 s in the fix since it was made: load 0\n"
                   "Loop time of 3 on 1 procs\n")
         self.assertEqual(golden.said(screen), ["fix cull solid/cull: the deck has no fix gravity"])

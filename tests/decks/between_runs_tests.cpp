@@ -31,6 +31,16 @@ State those_of(const State& all, const State& these) {
   return found;
 }
 
+/// Those of `these` that touch one of `all` that is not among these.
+std::vector<int> beside_the_lost(const State& all, const State& these) {
+  std::vector<int> beside;
+  for (const auto& [tag, lost] : all)
+    for (const auto& [other, g] : these)
+      if (!these.count(tag) && std::hypot(g.x[0] - lost.x[0], g.x[1] - lost.x[1], g.x[2] - lost.x[2]) < g.radius + lost.radius)
+        beside.push_back(other);
+  return beside;
+}
+
 class BetweenRuns : public testing::TestWithParam<Sequence> {};
 
 constexpr double diameter = 0.0026;
@@ -104,12 +114,15 @@ TEST_P(BetweenRuns, ActOnAllGranules) {
   const double after = interior(culled);
   never.run("run 0\n");
   culled.run("unfix cull\nrun 0\n");
-  const State fa = never.state();
+  State fa = never.state();
   State fb = culled.state();
-  // LIGGGHTS loses what a command has moved farther than to the next rank; the fix does not. The others are compared
+  // LIGGGHTS loses what a command has moved farther than to the next rank; the fix does not. The others are compared, but for
+  // those that would touch it
   const bool some_lost = never.ranks() > 4 && fa.size() < a.size();
+  const std::vector<int> beside = some_lost ? beside_the_lost(fb, fa) : std::vector<int>();
   if (some_lost) {
     ASSERT_EQ(fb.size(), a.size());
+    for (const int tag : beside) fa.erase(tag);
     fb = those_of(fb, fa);
   }
   ASSERT_EQ(fb.size(), fa.size());
@@ -120,7 +133,9 @@ TEST_P(BetweenRuns, ActOnAllGranules) {
     EXPECT_LE(largest_difference(fa, fb, &Granule::f), 1e-12 * std::max(contact_force, largest(fa, &Granule::f)));
     EXPECT_LE(largest_difference(fa, fb, &Granule::torque),
               1e-12 * std::max(contact_force * diameter / 2, largest(fa, &Granule::torque)));
-    EXPECT_EQ(never.histories().size(), culled.histories().size());
+    if (beside.empty()) {
+      EXPECT_EQ(never.histories().size(), culled.histories().size());
+    }
   }
   // and goes on
   never.run("run 20\n");
@@ -129,7 +144,7 @@ TEST_P(BetweenRuns, ActOnAllGranules) {
   State gb = culled.state();
   if (some_lost) gb = those_of(gb, ga);
   EXPECT_EQ(gb.size(), ga.size());
-  if (sequence.left == Sequence::Left::same_tags && ga.size() == gb.size())
+  if (sequence.left == Sequence::Left::same_tags && ga.size() == gb.size() && beside.empty())
     EXPECT_LE(largest_difference(ga, gb, &Granule::x), 1e-9 * diameter);
   if (never.rank() == 0) std::printf("%s: %g interior before, %g after\n", sequence.name.c_str(), before, after);
 }

@@ -60,16 +60,21 @@ TEST_P(FormulasBetweenRuns, AreOfTheWholeBed) {
   }
   if (p.commands == unfix) return;
   // what was asked has changed nothing
+  const std::size_t granules = never.state().size();
   never.run("run 0\n");
   culled.run("run 0\n");
   if (p.commands.empty()) {
     EXPECT_GT(culled.vector("cull", 3), 300);
   }
-  expect_all_there(culled, "cull", never.state().size());
+  expect_all_there(culled, "cull", granules);
   culled.run("unfix cull\n");
   never.run("run 20\n");
   culled.run("run 20\n");
-  const State a = never.state(), b = culled.state();
+  const State a = never.state();
+  State b = culled.state();
+  // LIGGGHTS loses what a command has moved farther than to the next rank; the fix does not
+  for (auto g = b.begin(); never.ranks() > 4 && a.size() < granules && g != b.end();)
+    g = a.count(g->first) ? std::next(g) : b.erase(g);
   EXPECT_LE(largest_difference(a, b, &Granule::x), 1e-9 * 0.0026);
   EXPECT_LE(largest_difference(a, b, &Granule::v), 1e-9);
   EXPECT_EQ(never.histories().size(), culled.histories().size());

@@ -119,7 +119,7 @@ TEST_P(Neighbours, AreThoseThatTheEngineFindsInItsOrder) {
   own.run(rain(mix));
   ours.run(rain(mix) + "fix cull all solid/cull every 1000000\n");  // nothing is culled: the same granules in both
   enum { kPairs, kGhosts, kTouching, kOctaves, kDifferent, kCounts };
-  std::array<int, kCounts> most{}, anywhere{};
+  std::array<int, kCounts> most{}, anywhere{}, everywhere{};
   std::string first;
   for (int part = 0; part < 4; ++part) {
     own.run("run 600\n");
@@ -142,17 +142,18 @@ TEST_P(Neighbours, AreThoseThatTheEngineFindsInItsOrder) {
     for (int k = 0; k < kCounts; ++k) most[k] = std::max(most[k], now[k]);
   }
   MPI_Allreduce(most.data(), anywhere.data(), kCounts, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+  MPI_Allreduce(most.data(), everywhere.data(), kCounts, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
   EXPECT_EQ(anywhere[kDifferent], 0) << first;
   // what was compared
   EXPECT_GT(anywhere[kPairs], 1000);
   EXPECT_EQ(anywhere[kOctaves], octaves_inserted(mix, own));
   const bool histories = mix.contact.find("no_history") == std::string::npos, images = mix.periodic || own.ranks() > 1;
   EXPECT_GE(anywhere[kTouching], histories ? 100 : 0);
-  EXPECT_GE(anywhere[kGhosts], images ? 50 : 0);
+  EXPECT_GE((own.ranks() > 4 ? everywhere : anywhere)[kGhosts], images ? 50 : 0);  // of a slab few are at its borders
   EXPECT_EQ(largest_difference(own.state(), ours.state(), &Granule::x), 0.0);
   EXPECT_EQ(largest_difference(own.state(), ours.state(), &Granule::f), 0.0);
   if (own.rank() == 0)
-    std::printf("%s: %d pairs, %d with ghosts, %d touching\n", mix.name.c_str(), anywhere[kPairs], anywhere[kGhosts],
+    std::printf("%s: %d pairs, %d with ghosts, %d touching\n", mix.name.c_str(), anywhere[kPairs], everywhere[kGhosts],
                 anywhere[kTouching]);
 }
 

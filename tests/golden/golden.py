@@ -246,9 +246,10 @@ def thermo_rows(screen):
 
 
 def said(screen):
-    """Lines of the fix itself, but for its version and those at a run's end: the rows have their counts, and seconds are no result."""
+    """Lines of the fix itself, but for its version, those at a run's end and the forecast: the rows have their counts, and what
+    seconds have gone into is no result."""
     lines = [line.strip() for line in screen.splitlines() if re.match(r"fix \S+ solid/cull: ", line)]
-    no_result = r": \d+ steps, \d+ granules$| s in the fix since|granules in \d+ bodies; culled |solid/cull: version "
+    no_result = r": \d+ steps, \d+ granules$| s in the fix since|granules in \d+ bodies; culled |solid/cull: version |: if it goes on like this"
     return [line for line in lines if not re.search(no_result, line)]
 
 
