@@ -144,17 +144,18 @@ TEST_P(Neighbours, AreThoseThatTheEngineFindsInItsOrder) {
   MPI_Allreduce(most.data(), anywhere.data(), kCounts, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
   MPI_Allreduce(most.data(), everywhere.data(), kCounts, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
   EXPECT_EQ(anywhere[kDifferent], 0) << first;
-  // what was compared
-  EXPECT_GT(anywhere[kPairs], 1000);
+  // what was compared; of eight ranks one alone has few
+  const auto& compared = own.ranks() > 4 ? everywhere : anywhere;
+  EXPECT_GT(compared[kPairs], 1000);
   EXPECT_EQ(anywhere[kOctaves], octaves_inserted(mix, own));
   const bool histories = mix.contact.find("no_history") == std::string::npos, images = mix.periodic || own.ranks() > 1;
-  EXPECT_GE(anywhere[kTouching], histories ? 100 : 0);
-  EXPECT_GE((own.ranks() > 4 ? everywhere : anywhere)[kGhosts], images ? 50 : 0);  // of a slab few are at its borders
+  EXPECT_GE(compared[kTouching], histories ? 100 : 0);
+  EXPECT_GE(compared[kGhosts], images ? 50 : 0);
   EXPECT_EQ(largest_difference(own.state(), ours.state(), &Granule::x), 0.0);
   EXPECT_EQ(largest_difference(own.state(), ours.state(), &Granule::f), 0.0);
   if (own.rank() == 0)
-    std::printf("%s: %d pairs, %d with ghosts, %d touching\n", mix.name.c_str(), anywhere[kPairs], everywhere[kGhosts],
-                anywhere[kTouching]);
+    std::printf("%s: %d pairs, %d with ghosts, %d touching\n", mix.name.c_str(), compared[kPairs], compared[kGhosts],
+                compared[kTouching]);
 }
 
 const char* no_history = "model hertz tangential no_history";
