@@ -115,8 +115,8 @@ void BodyGroups::settle_those_here() {
 template <class TakesPart>
 void BodyGroups::settle_those_over_ranks(TakesPart takes_part) {
   struct Part {
-    double mass, grounded_mass, felt_mass;  // the last: of what knows what it felt
-    Triple felt;                            // times that mass, world frame
+    double mass, grounded_mass, felt_mass;  // the last: of parts that know what gravity they felt when they were locked
+    Triple felt;                            // sum of that times their masses, world frame
     Triple centre, momentum, angular_momentum;
     std::array<double, 9> inertia;
     std::array<bool, 3> tied;

@@ -159,8 +159,8 @@ struct SolidBody {
   void take_twist() { twist = motion.twist(); }
 
   // after its granules changed
-  /// Whether it is a part of a body over several ranks now; where that is new its motion is to be settled, and what it felt as
-  /// the other one does not count.
+  /// Whether it is a part of a body over several ranks now; where that is new its motion is to be settled, and the window of its
+  /// mean acceleration begins anew.
   void note_span(bool spans_ranks) {
     if (spanned == spans_ranks) return;
     spanned = spans_ranks;
