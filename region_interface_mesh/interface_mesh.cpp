@@ -98,6 +98,16 @@ InterfaceMesh InterfaceMesh::copy() const {
   return mesh;
 }
 
+InterfaceMesh InterfaceMesh::within(const Vec3& lo, const Vec3& hi) const {
+  const Pose& pose = impl_->pose;
+  const Vec3 middle = pose.to_frame(0.5 * (lo + hi)), half = turned_half_box(pose.turn().transpose(), 0.5 * (hi - lo));
+  InterfaceMesh mesh(impl_->voxel, impl_->closing);
+  mesh.impl_->grid = level_set::part(*impl_->grid, {openvdb::Coord::floor(impl_->in_voxels(middle - half)),
+                                                    openvdb::Coord::ceil(impl_->in_voxels(middle + half))});
+  mesh.impl_->pose = pose;
+  return mesh;
+}
+
 void InterfaceMesh::set_pose(const Pose& pose) { impl_->pose = pose; }
 const Pose& InterfaceMesh::pose() const { return impl_->pose; }
 
@@ -129,6 +139,10 @@ bool InterfaceMesh::Impl::nothing_inside() {
   for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
     for (openvdb::Index n = 0; n < FloatTree::LeafNodeType::SIZE; ++n)
       if (leaf->getValue(n) < 0.0f) return false;
+  auto tile = tree.cbeginValueAll();
+  tile.setMaxDepth(FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile)
+    if (*tile < 0.0f) return false;
   return true;
 }
 
@@ -190,6 +204,8 @@ double InterfaceMesh::volume() const {
 
 double InterfaceMesh::half_width() const { return impl_->grid->background(); }
 
+double InterfaceMesh::context(double voxel, double closing) { return level_set::context(closing, voxel); }
+
 TriangleMesh InterfaceMesh::triangles(double adaptivity) const {
   std::vector<openvdb::Vec3s> points;
   std::vector<openvdb::Vec3I> threes;
@@ -207,6 +223,22 @@ TriangleMesh InterfaceMesh::triangles(double adaptivity) const {
     mesh.triangles.push_back({q[0], q[3], q[2]});
   }
   return mesh;
+}
+
+TriangleMesh part_of(const TriangleMesh& mesh, const std::function<bool(const Vec3& middle)>& wanted) {
+  constexpr std::uint32_t unused = std::numeric_limits<std::uint32_t>::max();
+  TriangleMesh part;
+  std::vector<std::uint32_t> number(mesh.vertices.size(), unused);
+  for (const auto& t : mesh.triangles) {
+    if (!wanted((mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0)) continue;
+    for (const std::uint32_t corner : t)
+      if (number[corner] == unused) {
+        number[corner] = static_cast<std::uint32_t>(part.vertices.size());
+        part.vertices.push_back(mesh.vertices[corner]);
+      }
+    part.triangles.push_back({number[t[0]], number[t[1]], number[t[2]]});
+  }
+  return part;
 }
 
 std::string InterfaceMesh::to_bytes() const {

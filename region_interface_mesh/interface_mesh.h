@@ -20,6 +20,9 @@ struct TriangleMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
+/// The triangles whose middle is wanted (m, world frame), and the vertices that they have. Local.
+TriangleMesh part_of(const TriangleMesh& mesh, const std::function<bool(const Vec3& middle)>& wanted);
+
 /// A level set around the granules of a solid body, negative inside, closed over the pores between granules. It is kept: where
 /// granules come and go it is made anew, and nowhere else, and is then what it would be if it were made at once.
 /// The mesh stands in the frame of its body: granules are given in that frame, what is asked in the world's, through the pose
@@ -36,6 +39,8 @@ class InterfaceMesh {
   static InterfaceMesh around(std::vector<Sphere> spheres, double voxel, double closing);
   /// The same surface; its upkeep begins anew.
   InterfaceMesh copy() const;
+  /// The same of what lies in a box around this one (m, world frame), as if nothing were inside beyond it.
+  InterfaceMesh within(const Vec3& lo, const Vec3& hi) const;
   InterfaceMesh(const InterfaceMesh&) = delete;
   InterfaceMesh& operator=(const InterfaceMesh&) = delete;
 
@@ -74,6 +79,8 @@ class InterfaceMesh {
   void bounds(Vec3& lo, Vec3& hi) const;
   double volume() const;      ///< enclosed volume in m^3; of a ball of 10 voxels to 0.1 %
   double half_width() const;  ///< |signed_distance| saturates here (m)
+  /// Granules whose surface is farther than this from a place (m) do not matter to what is there.
+  static double context(double voxel, double closing);
 
   /// The surface as triangles. adaptivity 0..1 merges flat parts (OpenVDB volumeToMesh).
   TriangleMesh triangles(double adaptivity = 0.0) const;

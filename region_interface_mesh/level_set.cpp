@@ -158,6 +158,26 @@ FloatGrid::Ptr closed_union(std::vector<Sphere> spheres, double closing, double 
   return shrink(*rasterise(spheres, closing, voxel), closing, voxel);
 }
 
+FloatGrid::Ptr part(const FloatGrid& grid, const openvdb::CoordBBox& box) {
+  const FloatTree& from = grid.constTree();
+  const float background = from.background();
+  const auto tree = std::make_shared<FloatTree>(background);
+  for (auto leaf = from.cbeginLeaf(); leaf; ++leaf)
+    if (box.hasOverlap(leaf->getNodeBoundingBox())) tree->addLeaf(new FloatTree::LeafNodeType(*leaf));
+  auto tile = from.cbeginValueAll();
+  tile.setMaxDepth(FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) {
+    openvdb::CoordBBox there;
+    if (!(*tile < background) || !tile.getBoundingBox(there)) continue;
+    there.intersect(box);
+    if (!there.empty()) tree->sparseFill(there, *tile, tile.isValueOn());
+  }
+  tree->clip(box);
+  const auto found = grid.copyWithNewTree();
+  found->setTree(tree);
+  return found;
+}
+
 /// OpenVDB's matrices act on row vectors.
 openvdb::math::Transform::Ptr transform(double voxel, const Pose& pose) {
   openvdb::Mat4R m = openvdb::Mat4R::identity();

@@ -28,6 +28,9 @@ inline double reach(double closing, double voxel) { return 2.0 * closing + half_
 /// Spheres that are farther than this from a place do not matter to what is right there; the grid may be wrong beside it (m).
 inline double context(double closing, double voxel) { return 2.0 * closing + (half_band + 1.0) * voxel; }
 
+/// What of it lies in the box.
+openvdb::FloatGrid::Ptr part(const openvdb::FloatGrid& grid, const openvdb::CoordBBox& box);
+
 /// Voxels of the body's frame seen from the world.
 openvdb::math::Transform::Ptr transform(double voxel, const Pose& pose);
 

@@ -55,20 +55,25 @@ void WholeFile::commit() {
 
 // --- the files --------------------------------------------------------------------------------------------------
 
-void write_stl(const std::string& file, const TriangleMesh& mesh) {
-  WholeFile out(file);
-  if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max())
-    out.fail(std::to_string(mesh.triangles.size()) + " triangles are more than an STL file can hold");
-  char header[80] = "solidcull interface mesh, lengths in m";
-  out.write(header, sizeof header);
-  const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
-  out.write(&count, sizeof count);
+std::string stl_head(const std::string& file, std::uint64_t triangles) {
+  if (triangles > std::numeric_limits<std::uint32_t>::max())
+    throw std::runtime_error("cannot write " + file + ": " + std::to_string(triangles) +
+                             " triangles are more than an STL file can hold");
+  std::string head("solidcull interface mesh, lengths in m");
+  head.resize(80, '\0');
+  const auto count = static_cast<std::uint32_t>(triangles);
+  return head.append(reinterpret_cast<const char*>(&count), sizeof count);
+}
+
+std::string stl_records(const TriangleMesh& mesh) {
+  constexpr std::size_t record = 50;  // normal, three corners, and two bytes that no one uses
+  std::string all(record * mesh.triangles.size(), '\0');
+  char* at = all.data();
   for (const auto& t : mesh.triangles) {
     const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
     const Vec3 area = (b - a).cross(c - a);
     const double size = area.norm();
     const Vec3 normal = size > 0 ? Vec3(area / size) : Vec3(Vec3::Zero());
-    char record[50] = {};  // normal, three corners, and two bytes that no one uses
     float number[12];
     for (int d = 0; d < 3; ++d) {
       number[d] = static_cast<float>(normal[d]);
@@ -76,10 +81,10 @@ void write_stl(const std::string& file, const TriangleMesh& mesh) {
       number[6 + d] = static_cast<float>(b[d]);
       number[9 + d] = static_cast<float>(c[d]);
     }
-    std::memcpy(record, number, sizeof number);
-    out.write(record, sizeof record);
+    std::memcpy(at, number, sizeof number);
+    at += record;
   }
-  out.commit();
+  return all;
 }
 
 namespace {
@@ -105,13 +110,20 @@ void write_poly_data(const std::string& file, const PolyDataPiece& piece, double
 
 }  // namespace
 
-void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<std::int64_t>& body_of_triangle,
-               double time) {
-  if (!body_of_triangle.empty() && body_of_triangle.size() != mesh.triangles.size())
-    throw std::invalid_argument("write_vtp: " + std::to_string(body_of_triangle.size()) + " body numbers for " +
+void write_stl(const std::string& file, const TriangleMesh& mesh) {
+  WholeFile out(file);
+  out.write(stl_head(file, mesh.triangles.size()));
+  out.write(stl_records(mesh));
+  out.commit();
+}
+
+PolyDataPiece mesh_piece(const std::string& file, const TriangleMesh& mesh, const std::vector<std::int64_t>* bodies, bool wide) {
+  if (bodies && bodies->size() != mesh.triangles.size())
+    throw std::invalid_argument("a file of triangles: " + std::to_string(bodies->size()) + " body numbers for " +
                                 std::to_string(mesh.triangles.size()) + " triangles");
   if (mesh.triangles.size() > std::numeric_limits<int>::max() / 3)
-    WholeFile(file).fail(std::to_string(mesh.triangles.size()) + " triangles are more than its 32-bit numbers can count");
+    throw std::runtime_error("cannot write " + file + ": " + std::to_string(mesh.triangles.size()) +
+                             " triangles are more than its 32-bit numbers can count");
   std::vector<float> position;
   position.reserve(3 * mesh.vertices.size());
   for (const Vec3& v : mesh.vertices)
@@ -122,14 +134,19 @@ void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vec
     for (const std::uint32_t corner : t) connectivity.push_back(static_cast<int>(corner));
 
   PolyDataPiece piece(mesh.vertices.size(), 0, mesh.triangles.size());
-  if (!body_of_triangle.empty()) {
+  if (bodies) {
     piece.begin("CellData Scalars=\"body\"");
-    add_numbers_of_bodies(piece, body_of_triangle, false);
+    add_numbers_of_bodies(piece, *bodies, wide);
   }
   piece.begin("Points");
   piece.add("Points", position, 3);
   piece.add_cells("Polys", connectivity, 3);
-  write_poly_data(file, piece, time);
+  return piece;
+}
+
+void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<std::int64_t>& body_of_triangle,
+               double time) {
+  write_poly_data(file, mesh_piece(file, mesh, body_of_triangle.empty() ? nullptr : &body_of_triangle, false), time);
 }
 
 void check_columns(const BedTable& bed) {

@@ -19,6 +19,15 @@ void write_stl(const std::string& file, const TriangleMesh& mesh);
 /// values, else Int64. time: s. Local.
 void write_vtp(const std::string& file, const TriangleMesh& mesh, const std::vector<std::int64_t>& body_of_triangle, double time);
 
+/// The same as one piece of several. bodies: null where there is no such array. wide: they are Int64, in all pieces alike. Throws
+/// std::runtime_error, naming the file, for more triangles than its 32-bit numbers can count. Local.
+PolyDataPiece mesh_piece(const std::string& file, const TriangleMesh& mesh, const std::vector<std::int64_t>* bodies, bool wide);
+/// An STL file is a head and so many records, of the whole mesh or of parts. Throws std::runtime_error, naming the file, for more
+/// than it can hold. Local.
+std::string stl_head(const std::string& file, std::uint64_t triangles);
+constexpr std::int64_t stl_head_bytes = 84;
+std::string stl_records(const TriangleMesh& mesh);
+
 /// OpenVDB file with one level-set grid per mesh, named by `names`. Local.
 void write_vdb(const std::string& file, const std::vector<const InterfaceMesh*>& meshes, const std::vector<std::string>& names);
 

@@ -25,12 +25,19 @@ def read(file):
     time = float(root.find("PolyData/FieldData/DataArray[@Name='TimeValue']").text)
     pieces = [arrays_of(piece, data, begin) for piece in root.findall("PolyData/Piece")]
     pieces = [p for p in pieces if len(p["points"])] or pieces[:1]  # a rank may have nothing
-    joined = pieces[0]
-    if len(pieces) > 1:
-        joined = {name: np.concatenate([p[name] for p in pieces]) for name in pieces[0]}
-        order = np.argsort(joined["id"], kind="stable")
-        joined = {name: values[order] for name, values in joined.items()}
-    return {"time": time, **joined}
+    return {"time": time, **(joined(pieces) if len(pieces) > 1 else pieces[0])}
+
+
+def joined(pieces):
+    """Granules by id; triangles with each vertex once, which borders of ranks have once for each rank."""
+    whole = {name: np.concatenate([p[name] for p in pieces]) for name in pieces[0]}
+    if "id" in whole:
+        order = np.argsort(whole["id"], kind="stable")
+        return {name: values[order] for name, values in whole.items()}
+    before = np.cumsum([0, *(len(p["points"]) for p in pieces)])
+    whole["points"], number = np.unique(whole["points"], axis=0, return_inverse=True)
+    whole["polys"] = number.reshape(-1)[np.concatenate([p["polys"] + n for p, n in zip(pieces, before)])]
+    return whole
 
 
 def arrays_of(piece, data, begin):

@@ -325,6 +325,12 @@ class KeywordRefusals(Case):
         self.refused_by_fix(deck(f"{FIX} mesh 10 a.vtp seen", granules=False),
                             f"unknown keyword 'seen': choose from {self.KEYWORDS}; behind the file of 'mesh' may stand 'surface', 'skin' or 'least K'")
 
+    def test_a_name_for_each_rank_where_all_write_one_file(self):
+        for keyword, ending in (("mesh", ".vtp"), ("mesh", ".stl"), ("bed", ".vtp")):
+            with self.subTest(keyword + ending):
+                self.refused_by_fix(deck(f"{FIX} {keyword} 10 a_%{ending}", granules=False),
+                                    f"keyword '{keyword}' has the value 'a_%{ending}': give a name without '%': all ranks write one {ending}")
+
     def test_voxel_too_coarse_for_depth(self):
         self.refused_by_fix(deck(FIX + " exterior live depth 1.5 voxel 2", granules=False),
                             "voxel 2.0 is too coarse for depth 1.5: choose voxel <= depth/2")

@@ -50,13 +50,13 @@ class Audit {
   struct Woken {
     std::int64_t tag;
     int patch;
-    int atom;          // while lists are the same
-    bool deep, ended;  // deep: it touched nothing that was awake
-    double tolerance;  // N
-    double load;       // what its contacts pressed with at first (N)
-    AuditedPatch did;  // it alone, until it ended
-    Vec3 carried;      // velocity of its body there (m/s)
-    Vec3 felt_then;    // from what is awake without this, at first (N)
+    int atom;                       // while lists are the same
+    bool deep, ended;               // deep: it touched nothing that was awake
+    double tolerance;               // N
+    double load;                    // what its contacts pressed with at first (N)
+    AuditedPatch did;               // it alone, until it ended
+    Vec3 carried = Vec3::Zero();    // velocity of its body there (m/s)
+    Vec3 felt_then = Vec3::Zero();  // from what is awake without this, at first (N)
   };
   struct Pair {
     int i, k, j;                // atom, partner of its row, that partner

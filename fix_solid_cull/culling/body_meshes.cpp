@@ -102,7 +102,6 @@ BodyMeshes::Bodies BodyMeshes::interface_granules() const {
   return all;
 }
 
-/// World frame, with those of other ranks, and periodic images.
 std::vector<Sphere> BodyMeshes::exterior_granules() const {
   const Atoms& atoms = bed_.atoms;
   std::vector<Sphere> all;

@@ -22,6 +22,9 @@ class BodyMeshes : public BodyFollower {
   /// Whether ask() has something to do.
   bool behind() const;
 
+  /// World frame, with those of other ranks, and periodic images.
+  std::vector<Sphere> exterior_granules() const;
+
   /// What is told stays as it is now, whatever becomes of granules and bodies, until let_go().
   void hold();
   void let_go();
@@ -37,7 +40,6 @@ class BodyMeshes : public BodyFollower {
   void drop(int body);
   void update();
   Bodies interface_granules() const;
-  std::vector<Sphere> exterior_granules() const;
   std::vector<Sphere> near(const InterfaceMesh& mesh, const SphereCells& exterior) const;
 
   Bed& bed_;

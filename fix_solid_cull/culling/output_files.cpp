@@ -19,6 +19,19 @@ namespace {
 
 constexpr BodyGroups::Key no_body = 0;
 
+bool ends_with(const std::string& name, const std::string& ending) {
+  return name.size() >= ending.size() && name.compare(name.size() - ending.size(), ending.size(), ending) == 0;
+}
+
+constexpr char rank_sign = '%';  // as in LIGGGHTS's dumps
+
+bool is_for_each_rank(const std::string& pattern) { return pattern.find(rank_sign) != std::string::npos; }
+
+std::string named_for(int rank, std::string pattern) {
+  const std::size_t at = pattern.find(rank_sign);
+  return at == std::string::npos ? pattern : pattern.replace(at, 1, std::to_string(rank));
+}
+
 }  // namespace
 
 void OutputFiles::begin_run() {
@@ -47,25 +60,37 @@ void OutputFiles::write_due() {
 
 template <class Write>
 void OutputFiles::write_one(const char* keyword, const std::string& pattern, Write write) {
-  const FileSeries series(pattern);
+  const FileSeries series(named_for(bed_.ranks.me, pattern));
   const std::int64_t step = bed_.run.deck_step();
   double time = bed_.ranks.me == 0 ? series.time_of(step, bed_.run.dt) : 0;
   bed_.ranks.largest(&time, 1);
   write(series.file(step), time);
-  on_root(keyword, [&] { series.note(step, time); });
+  const auto note = [&] { series.note(step, time); };
+  is_for_each_rank(pattern) ? on_each(keyword, note) : on_root(keyword, note);
 }
 
 /// Rank 0 writes; if it cannot, all ranks stop.
 template <class Write>
 void OutputFiles::on_root(const char* keyword, Write write) {
+  on_each(keyword, [&] {
+    if (bed_.ranks.me == 0) write();
+  });
+}
+
+/// Each rank writes; if one cannot, all stop, and say what the first of them says.
+template <class Write>
+void OutputFiles::on_each(const char* keyword, Write write) {
   std::string failure;
-  if (bed_.ranks.me == 0) try {
-      write();
-    } catch (const std::exception& e) {
-      failure = e.what();
-    }
-  if (bed_.ranks.any(!failure.empty()))
-    throw InputError("keyword '" + std::string(keyword) + "': " + failure + "; write it elsewhere, or leave the keyword out");
+  try {
+    write();
+  } catch (const std::exception& e) {
+    failure = std::string(e.what()) + '\n';
+  }
+  if (!bed_.ranks.any(!failure.empty())) return;
+  const std::vector<char> all = bed_.ranks.gather(std::vector<char>(failure.begin(), failure.end()));
+  throw InputError("keyword '" + std::string(keyword) +
+                   "': " + std::string(all.begin(), std::find(all.begin(), all.end(), '\n')) +
+                   "; write it elsewhere, or leave the keyword out");
 }
 
 // ------------------------------------------------------------------------------------------------------------ meshes
@@ -82,97 +107,72 @@ InterfaceMesh OutputFiles::skin_of_atoms() const {
   return InterfaceMesh::around(std::move(all), bed_.scales.voxel(), bed_.scales.closing());
 }
 
-/// Each body's mesh on rank 0, by key: each rank sends its parts, and those of one body are united in `parts`. Nothing elsewhere.
-/// skin: that of the atoms stands beside them, as of no body.
-OutputFiles::WholeMeshes OutputFiles::whole_meshes(Parts& parts, bool skin) {
+SurfaceParts OutputFiles::surfaces(const MeshOutput& output, bool for_each_rank) {
   const std::map<int, InterfaceMesh>& here = ask_meshes();
   const auto timed = report_.time(Part::mesh);
-  struct Head {
-    BodyGroups::Key key;
-    std::int64_t granules;
-    std::size_t bytes;
-  };
-  std::vector<Head> heads;
-  std::vector<char> bytes;
-  const auto send = [&](BodyGroups::Key key, std::int64_t granules, const InterfaceMesh& mesh) {
-    const std::string part = mesh.to_bytes();
-    heads.push_back({key, granules, part.size()});
-    bytes.insert(bytes.end(), part.begin(), part.end());
-  };
-  const auto granules_of = [&](int body) { return bed_.solid.bodies().body(body).mass.count; };
-  if (bed_.ranks.me != 0)
-    for (const auto& [body, mesh] : here) send(bed_.groups.key_of(body), granules_of(body), mesh);
-  if (skin && bed_.ranks.me != 0) send(no_body, 0, skin_of_atoms());
-  if (bed_.ranks.count > 1) {
-    heads = bed_.ranks.gather_on_root(heads);
-    bytes = bed_.ranks.gather_on_root(bytes);
-  }
-  WholeMeshes whole;
-  if (bed_.ranks.me != 0) return whole;
-  std::map<BodyGroups::Key, int> parts_of;
-  for (const Head& h : heads) ++parts_of[h.key];
-  for (const auto& body : here) ++parts_of[bed_.groups.key_of(body.first)];
-  if (skin) parts.emplace(no_body, skin_of_atoms());
-  const auto add = [&](BodyGroups::Key key, const std::string& part) {
-    InterfaceMesh mesh = InterfaceMesh::from_bytes(part, bed_.scales.voxel(), bed_.scales.closing());
-    const auto there = parts.find(key);
-    if (there == parts.end())
-      parts.emplace(key, std::move(mesh));
-    else
-      there->second.merge(std::move(mesh));
-  };
+  SurfaceParts parts(bed_.run, bed_.ranks, bed_.scales.voxel(), bed_.scales.closing());
   for (const auto& [body, mesh] : here) {
-    const BodyGroups::Key key = bed_.groups.key_of(body);
-    whole[key].granules += granules_of(body);
-    if (parts_of[key] == 1)
-      whole[key].mesh = &mesh;
+    const BodyGroups::Key number = bed_.groups.key_of(body);
+    const std::int64_t granules = bed_.solid.bodies().body(body).mass.count;
+    if (bed_.groups.spans(body))
+      parts.add_part(number, mesh.copy(), granules);
     else
-      add(key, mesh.to_bytes());
+      parts.add_whole(number, mesh, granules);
   }
-  const char* at = bytes.data();
-  for (const Head& h : heads) {
-    whole[h.key].granules += h.granules;
-    add(h.key, std::string(at, h.bytes));
-    at += h.bytes;
-  }
-  for (const auto& [key, part] : parts) whole[key].mesh = &part;
-  return whole;
+  if (bed_.ranks.count > 1)
+    for (auto& [number, seam] : seams_.ask()) parts.add_part(number, std::move(seam), 0);
+  if (output.least > 1) parts.leave_out_below(output.least);
+  if (output.skin) parts.add_part(no_body, skin_of_atoms(), 0);
+  if (output.surface || output.skin) parts.make_one();
+  if (!for_each_rank) ends_with(output.file, ".vdb") ? parts.join_on_root() : parts.join_here();
+  return parts;
 }
 
 void OutputFiles::write_meshes(const MeshOutput& output, const std::string& file, double time) {
-  Parts parts;
-  WholeMeshes whole = whole_meshes(parts, output.skin);
+  const bool for_each_rank = is_for_each_rank(output.file);
+  const SurfaceParts parts = surfaces(output, for_each_rank);
   const auto timed = report_.time(Part::files);
-  on_root("mesh", [&] {
-    for (auto w = whole.begin(); w != whole.end();)
-      w = w->first != no_body && w->second.granules < output.least ? whole.erase(w) : std::next(w);
-    InterfaceMesh one(bed_.scales.voxel(), bed_.scales.closing());
-    if (output.surface || output.skin) {
-      for (const auto& w : whole) one.merge(w.second.mesh->copy());
-      whole = {{no_body, {&one, 0}}};
-    }
-    const std::string ending = file.substr(file.size() - 4);
-    if (ending == ".vdb") {
+  if (ends_with(file, ".vdb")) {
+    const auto write = [&] {
       std::vector<const InterfaceMesh*> grids;
       std::vector<std::string> names;
-      for (const auto& w : whole) {
-        grids.push_back(w.second.mesh);
-        names.push_back(w.first == no_body ? "surface" : "body_" + std::to_string(w.first));
+      for (const auto& [number, surface] : parts.surfaces()) {
+        grids.push_back(surface.mesh);
+        names.push_back(number == no_body ? "surface" : "body_" + std::to_string(number));
       }
       write_vdb(file, grids, names);
-      return;
-    }
-    TriangleMesh all;
-    std::vector<std::int64_t> body;
-    for (const auto& w : whole) {
-      const TriangleMesh part = w.second.mesh->triangles();
-      const auto first = static_cast<std::uint32_t>(all.vertices.size());
-      all.vertices.insert(all.vertices.end(), part.vertices.begin(), part.vertices.end());
-      for (const auto& t : part.triangles) all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-      if (w.first != no_body) body.resize(all.triangles.size(), w.first);
-    }
-    ending == ".stl" ? write_stl(file, all) : write_vtp(file, all, body, time);
-  });
+    };
+    for_each_rank ? on_each("mesh", write) : on_root("mesh", write);
+    return;
+  }
+  TriangleMesh all;
+  std::vector<std::int64_t> bodies;
+  for (const auto& [number, surface] : parts.surfaces()) {
+    const TriangleMesh part = parts.triangles(*surface.mesh);
+    const auto first = static_cast<std::uint32_t>(all.vertices.size());
+    all.vertices.insert(all.vertices.end(), part.vertices.begin(), part.vertices.end());
+    for (const auto& t : part.triangles) all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    bodies.resize(all.triangles.size(), number);
+  }
+  const bool stl = ends_with(file, ".stl"), numbered = !output.surface && !output.skin;
+  if (!numbered) bodies.clear();
+  if (bed_.ranks.count == 1)
+    on_root("mesh", [&] { stl ? write_stl(file, all) : write_vtp(file, all, bodies, time); });
+  else if (stl)
+    write_stl_parts(file, all);
+  else
+    write_pieces("mesh", file, time, [&] { return mesh_piece(file, all, numbered ? &bodies : nullptr, true); });
+}
+
+/// Each rank its own triangles, one behind the other.
+void OutputFiles::write_stl_parts(const std::string& file, const TriangleMesh& mesh) {
+  auto triangles = static_cast<std::int64_t>(mesh.triangles.size());
+  const std::string records = stl_records(mesh);
+  const std::int64_t at = bed_.ranks.sum_before(static_cast<std::int64_t>(records.size()));
+  bed_.ranks.sum(&triangles, 1);
+  std::string head;
+  on_root("mesh", [&] { head = stl_head(file, static_cast<std::uint64_t>(triangles)); });
+  write_together("mesh", file, {{0, head}, {stl_head_bytes + at, records}});
 }
 
 // ------------------------------------------------------------------------------------------------------------ the bed
@@ -246,47 +246,56 @@ BedTable OutputFiles::table(const BedOutput& output, std::vector<Row> rows) {
 void OutputFiles::write_bed(const BedOutput& output, const std::string& file, double time) {
   const auto timed = report_.time(Part::files);
   std::vector<Row> rows = rows_of_bed(output);
-  if (file.substr(file.size() - 4) == ".vdb") {
-    if (bed_.ranks.count > 1) rows = bed_.ranks.gather_on_root(rows);
-    on_root("bed", [&] { write_bed_vdb(file, table(output, std::move(rows)), time); });
+  if (ends_with(file, ".vdb")) {
+    const bool for_each_rank = is_for_each_rank(output.file);
+    if (bed_.ranks.count > 1 && !for_each_rank) rows = bed_.ranks.gather_on_root(rows);
+    const auto write = [&] { write_bed_vdb(file, table(output, std::move(rows)), time); };
+    for_each_rank ? on_each("bed", write) : on_root("bed", write);
     return;
   }
   const BedTable bed = table(output, std::move(rows));
   if (bed_.ranks.count == 1)
     on_root("bed", [&] { write_bed_vtp(file, bed, time); });
   else
-    write_in_parts("bed", file, bed_piece(bed, true), time);
+    write_pieces("bed", file, time, [&] { return bed_piece(bed, true); });
 }
 
-/// Each rank its own, one behind the other: none holds more than that.
-void OutputFiles::write_in_parts(const char* keyword, const std::string& file, const PolyDataPiece& piece, double time) {
+/// Each rank makes its own piece; they stand one behind the other.
+void OutputFiles::write_pieces(const char* keyword, const std::string& file, double time,
+                               const std::function<PolyDataPiece()>& make) {
   const Ranks& ranks = bed_.ranks;
+  std::optional<PolyDataPiece> piece;
+  on_each(keyword, [&] { piece = make(); });
+  const std::string begins = poly_data_begins(time), middle = poly_data_middle, ends = poly_data_ends;
+  std::int64_t sizes[2] = {0, static_cast<std::int64_t>(piece->data().size())};
+  const std::int64_t data_before = ranks.sum_before(sizes[1]);
+  const std::string head = piece->head(static_cast<std::uint64_t>(data_before));
+  sizes[0] = static_cast<std::int64_t>(head.size());
+  const std::int64_t head_before = ranks.sum_before(sizes[0]);
+  ranks.sum(sizes, 2);
+
+  const auto heads_begin = static_cast<std::int64_t>(begins.size()), heads_end = heads_begin + sizes[0];
+  const std::int64_t data_begin = heads_end + static_cast<std::int64_t>(middle.size());
+  std::vector<Stretch> stretches = {{heads_begin + head_before, head}, {data_begin + data_before, piece->data()}};
+  if (ranks.me == 0) {
+    stretches.push_back({0, begins});
+    stretches.push_back({heads_end, middle});
+  }
+  if (ranks.me == ranks.count - 1) stretches.push_back({data_begin + sizes[1], ends});
+  write_together(keyword, file, stretches);
+}
+
+/// All ranks write one file, each its own stretches of it: none holds more than that.
+void OutputFiles::write_together(const char* keyword, const std::string& file, const std::vector<Stretch>& stretches) {
   std::unique_ptr<WholeFile> whole;
   on_root(keyword, [&] {
     whole = std::make_unique<WholeFile>(file);
     whole->close();
   });
-  const std::string begins = poly_data_begins(time), middle = poly_data_middle, ends = poly_data_ends;
-  std::int64_t sizes[2] = {0, static_cast<std::int64_t>(piece.data().size())};
-  const std::int64_t data_before = ranks.sum_before(sizes[1]);
-  const std::string head = piece.head(static_cast<std::uint64_t>(data_before));
-  sizes[0] = static_cast<std::int64_t>(head.size());
-  const std::int64_t head_before = ranks.sum_before(sizes[0]);
-  ranks.sum(sizes, 2);
-
-  const std::unique_ptr<SharedFile> shared = ranks.open_to_write(WholeFile::part_of(file));
-  const auto write = [&](std::int64_t at, const std::string& text) {
-    shared->write(static_cast<std::uint64_t>(at), text.data(), text.size());
-  };
-  const auto heads_begin = static_cast<std::int64_t>(begins.size()), heads_end = heads_begin + sizes[0];
-  const std::int64_t data_begin = heads_end + static_cast<std::int64_t>(middle.size());
-  if (ranks.me == 0) write(0, begins);
-  write(heads_begin + head_before, head);
-  if (ranks.me == 0) write(heads_end, middle);
-  write(data_begin + data_before, piece.data());
-  if (ranks.me == ranks.count - 1) write(data_begin + sizes[1], ends);
+  const std::unique_ptr<SharedFile> shared = bed_.ranks.open_to_write(WholeFile::part_of(file));
+  for (const auto& [at, text] : stretches) shared->write(static_cast<std::uint64_t>(at), text.data(), text.size());
   std::int64_t error = shared->close();
-  ranks.largest(&error, 1);
+  bed_.ranks.largest(&error, 1);
   on_root(keyword, [&] {
     if (error) whole->fail(std::strerror(static_cast<int>(error)));
     whole->commit();

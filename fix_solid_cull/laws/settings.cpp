@@ -49,16 +49,20 @@ class Values {
     ++at_;
     return true;
   }
+  /// Ends with one of these. With '%' each rank writes a file of its own, which some kinds of files have no need of.
   std::string file(const std::vector<std::string>& endings, const char* wanted) {
     const std::string& w = word(wanted);
     for (const std::string& e : endings)
-      if (w.size() > e.size() && w.compare(w.size() - e.size(), e.size(), e) == 0) return w;
+      if (w.size() > e.size() && w.compare(w.size() - e.size(), e.size(), e) == 0) {
+        if (e != ".vdb" && w.find('%') != std::string::npos) refuse(w, "a name without '%': all ranks write one " + e);
+        return w;
+      }
     refuse(w, wanted);
     return {};
   }
 
  private:
-  void refuse(const std::string& value, const char* wanted) const {
+  void refuse(const std::string& value, const std::string& wanted) const {
     throw InputError("keyword '" + words_[keyword_] + "' has the value '" + value + "': give " + wanted);
   }
 

@@ -3,11 +3,15 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstdio>
 #include <fstream>
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "atom.h"
@@ -257,6 +261,68 @@ TEST(MeshRegion, ChoosesWhatIsWritten) {
       again.run(head(Bed()) + "read_restart region.restart\nvariable n equal atoms\n");
       EXPECT_EQ(static_cast<double>(again.lammps()->atom->natoms), held) << state.name << ", side " << side;
     }
+}
+
+// ------------------------------------------------------------------------------------------------------------ files
+
+/// A closed surface as an STL file has it: edges that are not passed as often one way as the other, and what it encloses (m^3).
+struct Closed {
+  std::size_t triangles = 0, open_edges = 0;
+  double volume = 0;
+};
+
+Closed read_stl(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string head(80, '\0');
+  std::uint32_t count = 0;
+  in.read(head.data(), 80).read(reinterpret_cast<char*>(&count), sizeof count);
+  using Corner = std::array<float, 3>;
+  struct [[gnu::packed]] Record {
+    float normal[3], corners[9];
+    char none[2];
+  } r;
+  Closed found;
+  std::map<std::pair<Corner, Corner>, int> passed;
+  for (; found.triangles < count && in.read(reinterpret_cast<char*>(&r), sizeof r); ++found.triangles) {
+    Corner c[3];
+    Vec3 v[3];
+    for (int k = 0; k < 3; ++k)
+      for (int d = 0; d < 3; ++d) v[k][d] = c[k][static_cast<std::size_t>(d)] = r.corners[3 * k + d];
+    found.volume += v[0].dot(v[1].cross(v[2])) / 6;
+    for (int k = 0; k < 3; ++k) {
+      const Corner &from = c[k], &to = c[(k + 1) % 3];
+      if (from != to) from < to ? ++passed[{from, to}] : --passed[{to, from}];
+    }
+  }
+  EXPECT_EQ(found.triangles, count) << file << " ends too early";
+  for (const auto& p : passed) found.open_edges += p.second != 0;
+  return found;
+}
+
+/// All granules are atoms in the first step, and nearly all sleep in the last: the skin of the bed is the same.
+TEST(FilesOfMeshes, AreClosedAndAreTheSameOnAnyRanks) {
+  Bed bed;
+  bed.name = "mesh";
+  Engine e;
+  e.run(read_bed(bed) +
+        "run 0\nfix cull all solid/cull every 50 calm 2 speed 0.05 tolerance 30 1 mesh 300 skin_*.stl skin mesh 300 bodies_*.stl "
+        "mesh 300 bodies_*_%.vdb mesh 300 bodies_*.vtp bed 300 bed_*_%.vdb\n"
+        "reset_timestep 0\nrun 300\n");
+  EXPECT_GT(e.vector("cull", 3), 300) << "stored granules";
+  for (const char* what : {"bodies", "bed"})
+    EXPECT_TRUE(std::ifstream(what + ("_000000300_" + std::to_string(e.rank())) + ".vdb").good()) << what;
+  if (e.rank() != 0) return;
+  const Closed awake = read_stl("skin_000000000.stl"), asleep = read_stl("skin_000000300.stl"),
+               bodies = read_stl("bodies_000000300.stl");
+  for (const Closed* c : {&awake, &asleep, &bodies}) {
+    EXPECT_GT(c->triangles, 1000u);
+    EXPECT_EQ(c->open_edges, 0u);
+  }
+  EXPECT_NEAR(asleep.volume, awake.volume, 0.002 * awake.volume);
+  EXPECT_LT(std::abs(static_cast<double>(asleep.triangles) / static_cast<double>(awake.triangles) - 1), 0.02);
+  EXPECT_LT(bodies.volume, 1.0001 * asleep.volume);
+  std::printf("skin: %zu and %zu triangles, %.6g and %.6g m^3; bodies: %zu, %.6g m^3\n", awake.triangles, asleep.triangles,
+              awake.volume, asleep.volume, bodies.triangles, bodies.volume);
 }
 
 }  // namespace

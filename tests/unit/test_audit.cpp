@@ -45,9 +45,6 @@ struct Pressed {
   Culling culling;
 };
 
-/// The mean of the interval's logarithms: what was seen.
-double seen(Pressed& p, int low) { return std::sqrt(p.value(low) * p.value(low + 1)); }
-
 TEST(Audit, sees_what_sleeps_through_a_small_load) {
   SmallWorld world(Pressed::deck());
   Pressed p(world, audited(300, 1));
