@@ -8,9 +8,9 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
-#include <tuple>
 
 #include "interface_mesh_impl.h"
+#include "sphere_order.h"
 
 namespace solidcull {
 namespace {
@@ -54,10 +54,6 @@ void for_each_in(const openvdb::CoordBBox& box, Visit visit) {
   for (auto at = box.begin(); at; ++at) visit(*at);
 }
 
-bool before(const Sphere& a, const Sphere& b) {
-  return std::make_tuple(a.centre.x(), a.centre.y(), a.centre.z(), a.radius) <
-         std::make_tuple(b.centre.x(), b.centre.y(), b.centre.z(), b.radius);
-}
 bool same(const Sphere& a, const Sphere& b) { return a.centre == b.centre && a.radius == b.radius; }
 bool same(const std::vector<Sphere>& a, const std::vector<Sphere>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Sphere& x, const Sphere& y) { return same(x, y); });

@@ -122,8 +122,7 @@ std::vector<Sphere> BodyMeshes::exterior_granules() const {
   return all;
 }
 
-/// In the frame of the body.
-std::vector<Sphere> BodyMeshes::near(const InterfaceMesh& mesh, const SphereCells& exterior) const {
+std::vector<Sphere> BodyMeshes::near(const InterfaceMesh& mesh, const SphereCells& exterior) {
   Vec3 lo, hi;
   if (!mesh.grid_box(lo, hi)) return {};
   const Pose& pose = mesh.pose();

@@ -24,6 +24,8 @@ class BodyMeshes : public BodyFollower {
 
   /// World frame, with those of other ranks, and periodic images.
   std::vector<Sphere> exterior_granules() const;
+  /// Those of them that may reach into the mesh, in its frame.
+  static std::vector<Sphere> near(const InterfaceMesh& mesh, const SphereCells& exterior);
 
   /// What is told stays as it is now, whatever becomes of granules and bodies, until let_go().
   void hold();
@@ -40,7 +42,6 @@ class BodyMeshes : public BodyFollower {
   void drop(int body);
   void update();
   Bodies interface_granules() const;
-  std::vector<Sphere> near(const InterfaceMesh& mesh, const SphereCells& exterior) const;
 
   Bed& bed_;
   const ShownBed& shown_;

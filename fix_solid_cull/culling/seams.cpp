@@ -4,21 +4,13 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <tuple>
 #include <utility>
 
 #include "box.h"
 #include "sphere_cells.h"
+#include "sphere_order.h"
 
 namespace solidcull {
-namespace {
-
-bool before(const Sphere& a, const Sphere& b) {
-  return std::make_tuple(a.centre.x(), a.centre.y(), a.centre.z(), a.radius) <
-         std::make_tuple(b.centre.x(), b.centre.y(), b.centre.z(), b.radius);
-}
-
-}  // namespace
 
 /// A pore reaches two radii of the closing ball beyond the border; what is there is to be right.
 double Seams::width() const {
@@ -91,16 +83,7 @@ std::map<BodyGroups::Key, InterfaceMesh> Seams::ask() {
       });
     };
     kept.mesh.update(members, cells.largest_radius());
-    std::vector<Sphere> out;
-    Vec3 lo, hi;
-    if (kept.mesh.grid_box(lo, hi)) {
-      const Vec3 reach = Vec3::Constant(exterior.largest_radius());
-      exterior.for_each_in_box(lo - reach, hi + reach, [&](std::size_t, const Sphere& s) {
-        out.push_back(s);
-        return true;
-      });
-    }
-    kept.mesh.leave_out(std::move(out), members, cells.largest_radius());
+    kept.mesh.leave_out(BodyMeshes::near(kept.mesh, exterior), members, cells.largest_radius());
     seams.emplace(number, kept.mesh.within(own.lo, own.hi));
   }
   return seams;
