@@ -35,6 +35,7 @@ The folder `validation` is what `validation/run.sh` is made of:
 | `validation.points` | the ways in which a case is run: unculled, tolerances, the paper's scheme, by hand |
 | `validation.case_runs` | the beds and the runs of a case |
 | `validation.short_cases` | each case's deck cut short to a few steps |
+| `validation.earlier` | runs of which only the kept result is left |
 | `validation.case_results` | what the runs of a case gave, as plain data |
 | `validation.fields` | coarse-grained fields of a bed, and their distance |
 | `validation.verdicts` | two one-sided tests on pairs of runs, and what they say of a case |

@@ -17,6 +17,7 @@ import sys
 import tempfile
 import types
 import unittest
+import unittest.mock
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT))
 from solidcull_runs import logs  # noqa: E402
+from solidcull_runs.validation.earlier import Earlier, EarlierRun, mark  # noqa: E402
 from solidcull_runs.validation import (case_results, case_runs, cases, command, deciding, fields, first_page, forecasts, kept_figures, pages,  # noqa: E402
                                        points, report, sequential, short_cases, verdicts)
 from solidcull_runs.errors import RunError  # noqa: E402
@@ -154,24 +156,18 @@ class Points(Folder):
 
 
 Job = collections.namedtuple("Job", "scene point k")
-Family = collections.namedtuple("Family", "family")
 
 
 class Ledger(unittest.TestCase):
     """Granules that a culled run misses."""
 
-    def runs(self, *given):
-        """Each: family, inserted, ids at the end. Ten granules are there at the start."""
-        done = {}
-        for k, (family, inserted, ids) in enumerate(given):
-            job = Job("", Family(family), k)
-            final = np.array([(i,) for i in ids], [("id", int)])
-            done[job] = types.SimpleNamespace(start=range(10), inserted=inserted, final=final)
-        return done
-
     def lost(self, *given, refilled=False):
-        return case_results.lost(self.runs((points.UNCULLED, 5, range(15)), (points.UNCULLED, 3, range(13)), *given),
-                              types.SimpleNamespace(scenes=[""]), refilled)
+        """Each: family, inserted, ids at the end. Ten granules are there at the start."""
+        of_scene = {}
+        for family, inserted, ids in ((points.UNCULLED, 5, range(15)), (points.UNCULLED, 3, range(13)), *given):
+            run = types.SimpleNamespace(start=range(10), inserted=inserted, final=np.array([(i,) for i in ids], [("id", int)]))
+            of_scene.setdefault(family, {"family": family, "runs": []})["runs"].append(case_results.granules_of(run))
+        return case_results.lost({"scenes": {"": {"points": of_scene}}}, refilled)
 
     def test_what_was_put_in_counts(self):
         self.assertEqual(self.lost((points.SLEEP, 1, range(11))), 0, "fewer found room; none is lost")
@@ -749,6 +745,60 @@ class Command(Folder):
         self.assertEqual(command.run_case(case, [], course, files, self.folder / "out"), [])
         self.assertEqual(files[0].read_text(), files[1].read_text())
         self.assertEqual(json.loads(files[1].read_text())["case"], "c")
+
+    def earlier(self, out, fix, case=None):
+        """The jobs of a case, and runs of them as they stand in a result."""
+        case = case or cases.load(["slow_impact"], "quick")[0]
+        beds = {(case.name, scene): None for scene in case.scenes}
+        return case, case_runs.jobs_of(case, out / "quick", beds, "launcher", fix)
+
+    def result_with(self, case, jobs):
+        """As if all of these were run: alike, but for a little."""
+        done = {job: EarlierRun({"k": job.k, "mark": mark(job), "seconds": 1.0, "steps": 1, "counts": {}, "granules": 8, "twice": 0, "missing": 0,
+                                 "values": {m.name: 1 + 1e-6 * (job.k + len(job.point.family)) for m in case.metrics}}) for job in jobs}
+        return {**case_results.result_of(case, done), "fields": {"sleep 3 0": "of finals"}, "bound": {"moving": 3}, "lost": 0}
+
+    def test_runs_of_a_result_that_was_kept_are_not_made_again(self):
+        case, jobs = self.earlier(self.folder / "there", "fix")
+        result = self.result_with(case, jobs[:-1])
+        _, here = self.earlier(self.folder / "here", "fix", case)
+        found = Earlier(result, here)
+        self.assertEqual([bool(found.run_of(job)) for job in here], [True] * (len(jobs) - 1) + [False])
+        self.assertEqual(found.run_of(here[0]).metrics, {m.name: 1 + 1e-6 * len("unculled") for m in case.metrics})
+
+        done = {job: found.run_of(job) for job in here[:-1]}
+        again = case_results.result_of(case, done, False, found)
+        self.assertEqual(again, result)
+        self.assertEqual(case_results.result_of(case, done)["fields"], {})
+
+    def test_runs_of_another_fix_or_deck_are_made_again_all_of_them(self):
+        case, jobs = self.earlier(self.folder / "there", "fix")
+        result = self.result_with(case, jobs)
+        for fix, granules in (("another fix", None), ("fix", 5000)):
+            other = cases.load(["slow_impact"], "quick")[0]
+            if granules:
+                other.scenes[other.main_scene]["bed_granules"] = granules
+            _, here = self.earlier(self.folder / "here", fix, other)
+            found = Earlier(result, here)
+            self.assertEqual([job for job in here if found.run_of(job)], [])
+            fresh = {"fields": {}, "bound": None}
+            found.add_to(fresh)
+            self.assertEqual(fresh, {"fields": {}, "bound": None})
+
+    def test_a_case_goes_on_from_what_was_kept_elsewhere(self):
+        case, jobs = self.earlier(self.folder / "there", "fix")
+        kept, said = self.folder / "kept" / "slow_impact.json", []
+        kept.parent.mkdir()
+        kept.write_text(json.dumps(self.result_with(case, jobs[:-1])))
+        _, here = self.earlier(self.folder / "here", "fix", case)
+        files = [self.folder / "here" / "results.json", kept]
+        with unittest.mock.patch.object(case_runs.CaseJob, "start", side_effect=RunError("no engine here")) as start:
+            failed = command.run_case(case, here, case_runs.Course(here, 1, said.append), files, self.folder / "here")
+        self.assertEqual((start.call_count, failed), (1, ["slow_impact: no engine here"]))
+        result = json.loads(kept.read_text())
+        self.assertEqual(files[0].read_text(), kept.read_text())
+        self.assertEqual(sum(len(e["runs"]) for s in result["scenes"].values() for e in s["points"].values()), len(jobs) - 1)
+        self.assertEqual(result["bound"], {"moving": 3})
 
     def test_an_unknown_case(self):
         status, said = self.validate("true", "crater")

@@ -11,6 +11,7 @@ from ..errors import RunError
 from ..logs import loops
 from . import fields
 from .cases import PRODUCTION
+from .earlier import Earlier, EarlierRun, mark
 from .points import ALSO, BY_HAND, PAPER, UNCULLED
 
 MOVED = 1e-2  # mean diameters between two snapshots: what moves
@@ -42,12 +43,14 @@ def moved(file, diameter):
 
 def run_data(job, run):
     """A run as plain data."""
+    if isinstance(run, EarlierRun):
+        return run.data
     counts = {}
     if run.counts:
         counts = {name: float(run.counts[name].mean()) for name in ("exterior", "interface", "interior")}
         counts |= {name: float(run.counts[name][-1]) for name in ("culled", "restored", "carves", "seconds", "restore_energy")}
-    data = {"k": job.k, "seconds": round(run.own_time, 3), "steps": run.steps(), "counts": counts, "values": run.metrics,
-            "granules": None if run.final is None else len(run.final)}
+    data = {"k": job.k, "mark": mark(job), "seconds": round(run.own_time, 3), "steps": run.steps(), "counts": counts, "values": run.metrics,
+            **granules_of(run)}
     if job.point.default:
         data["loops"] = loops(job.file(".log").read_text(errors="replace"))
     if job.point.default and job.scene == job.case.main_scene:
@@ -55,9 +58,9 @@ def run_data(job, run):
     return data
 
 
-def result_of(case, done, decided=False):
-    """What the runs of a case gave. `done`: as from run_all(), of this case's jobs. `decided`: pairs were added until each metric was,
-    or there were as many as there may be."""
+def result_of(case, done, decided=False, earlier=None):
+    """What the runs of a case gave. `done`: as from run_all(), of this case's jobs. `decided`: pairs are added until each metric is,
+    or there are as many as there may be. `earlier`: an Earlier of which some runs are."""
     result = {"case": case.name, "title": case.title, "claim": case.claim, "reference": case.reference, "size": case.size,
               "metrics": [{"name": m.name, "unit": m.unit, "margin": m.margin, "relative": m.relative, "why": m.why} for m in case.metrics],
               "scenes": {}, "failed": [], "bound": None, "fields": {}, "laws": [], "lost": 0, "lost_refilled": 0, "decided": decided}
@@ -79,8 +82,8 @@ def result_of(case, done, decided=False):
         if len(set(values)) < len(values):
             result["failed"].append({"run": "unculled", "point": UNCULLED, "why": f"unculled runs are alike: '{case.need('aside')}' moves "
                                      "nothing, as with '-${aside}', or a mesh whose fix ID is in the restart file"})
-    result["lost"], result["lost_refilled"] = lost(done, case), lost(done, case, refilled=True)
-    main = {job: run for job, run in done.items() if job.scene == case.main_scene and not isinstance(run, str)}
+    result["lost"], result["lost_refilled"] = lost(result), lost(result, refilled=True)
+    main = {job: run for job, run in done.items() if job.scene == case.main_scene and not isinstance(run, (str, EarlierRun))}
     finals = {}
     for job, run in main.items():
         if run.final is not None and job.k < FIELDS_OF:
@@ -96,28 +99,34 @@ def result_of(case, done, decided=False):
             steps, counts = moved(framed.file(".frames"), diameter)
             mean = statistics.fmean(counts) if counts else 0
             result["bound"] = {"every": framed.frames, "moving": mean, "N/N_moving": case.granules(case.main_scene) / mean if mean else None}
+    (earlier or Earlier()).add_to(result)
     laws = case.get("laws")
     if laws and case.size != PRODUCTION:
         result["laws"] = laws_of(case, result, laws)
     return result
 
 
-def lost(done, case, refilled=False):
+def granules_of(run):
+    """How many granules were there at the end, how many that had been there or were put in were `missing`, how many were there `twice`."""
+    if run.final is None:
+        return {"granules": None}
+    there = len(np.unique(run.final["id"]))
+    return {"granules": len(run.final), "missing": len(run.start) + run.inserted - there, "twice": len(run.final) - there}
+
+
+def lost(result, refilled=False):
     """Granules that culled runs miss at the end, of those that were there and those that were put in, but for as many as leave
     unculled runs of the same scene; the most of any run. Below 0: there twice. Of the paper's scheme (`refilled`) or of all others."""
     worst = 0
-    for scene in case.scenes:
+    for of_scene in result["scenes"].values():
         leave, missing = [], []
-        for job, run in done.items():
-            family = job.point.family
-            if job.scene != scene or family == BY_HAND or isinstance(run, str) or run.final is None:
-                continue
-            there = len(np.unique(run.final["id"]))
-            if family == UNCULLED:
-                leave.append(len(run.start) + run.inserted - there)
-            elif (family == PAPER) == refilled:
-                missing.append(len(run.start) + run.inserted - there)
-                worst = max(worst, there - len(run.final), key=abs)
+        for entry in of_scene["points"].values():
+            ended = [run for run in entry["runs"] if run["granules"] is not None]
+            if entry["family"] == UNCULLED:
+                leave += [run["missing"] for run in ended]
+            elif entry["family"] != BY_HAND and (entry["family"] == PAPER) == refilled:
+                missing += [run["missing"] for run in ended]
+                worst = max([worst, *(-run["twice"] for run in ended)], key=abs)
         for n in missing if leave else ():
             worst = max(worst, n - max(min(leave), min(max(leave), n)), key=abs)
     return int(worst)

@@ -170,16 +170,16 @@ def jobs_of(case, out, beds, launcher, fix, also=(), ranks=1):
     return jobs
 
 
-def run_all(jobs, course):
+def run_all(jobs, course, earlier=None):
     """Runs them in their order, as many at once as the course says: {job: run, or the line that says why there is none}. One that
-    fails stops none."""
+    fails stops none. Those of `earlier` (an Earlier) are taken from there."""
     at_once, waiting, running, done, ended = course.at_once, list(jobs), [], {}, []
     try:
         while waiting or running or ended:
             while waiting and len(running) < at_once:
                 job = waiting.pop(0)
                 try:
-                    run = job.kept()
+                    run = job.kept() or (earlier and earlier.run_of(job))
                     if run:
                         done[job] = run
                         course.skip(job)

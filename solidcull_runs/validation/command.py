@@ -3,7 +3,7 @@
 Runs cases, unculled and culled, and writes the report. `--decide`, a part of `--full`: pairs of runs are added until each metric is
 equivalent or outside, 30 at most. What was run before, with the same deck and the same fix, is not run again:
 after a kill the same command goes on. `--keep` keeps results of cases with the sources: so a report may take several sittings, on
-machines that know nothing of each other. `--few-steps`: each deck once unculled and once culled, cut short; no report.
+machines that know nothing of each other, and so may the pairs of a case. `--few-steps`: each deck once unculled and once culled, cut short; no report.
 Exit: 0 the report is written and nothing is lost, 1 a granule is lost, 2 a case or run failed (one line each).
 """
 import argparse
@@ -16,6 +16,7 @@ from ..dumps import read_final
 from ..errors import RunError
 from ..twins import cores
 from . import case_results, case_runs, cases, deciding, report, sequential, short_cases, slices
+from .earlier import Earlier, EarlierRun
 from .points import SLEEP, UNCULLED
 
 HERE = engine.ROOT / "validation"
@@ -48,6 +49,7 @@ def options(argv):
         p.error("--publish takes all cases, --full or --production, and neither --few-steps nor --also nor --ranks")
     if a.ranks < 1 or (a.few_steps and a.ranks != 1):
         p.error("--ranks takes 1 or more, and not with --few-steps")
+    a.out = a.out.resolve()
     if a.decide is None:
         a.decide = a.size == "full"
     if a.at_once is None:
@@ -62,25 +64,34 @@ def say(line):
 
 
 def run_case(case, jobs, course, files, out, maker=None):
-    """Runs it and leaves its results in these files; the lines of what failed. `maker`: of more runs, until its metrics are decided."""
-    done = case_runs.run_all(jobs, course)
-    while maker and (wanted := deciding.further(case, done)):
+    """Runs it and leaves its results in these files; the lines of what failed. Runs of the last file's result are not made again.
+    `maker`: of more runs, until its metrics are decided. Results are left before each such step, too."""
+    earlier = Earlier(case_results.read_result(files[-1]) if files[-1].exists() else None, jobs)
+    done = case_runs.run_all(jobs, course, earlier)
+    while True:
+        result = case_results.result_of(case, done, bool(maker), earlier)
+        leave(result, files)
+        wanted = deciding.further(case, done) if maker else {}
+        if not wanted:
+            break
         more = [job for scene, of_scene in wanted.items() for job in maker.jobs(scene, of_scene)]
         course.add(more)
-        done |= case_runs.run_all(more, course)
-    result = case_results.result_of(case, done, bool(maker))
+        done |= case_runs.run_all(more, course, earlier)
     draw(case, done, out / case.name / "what_moves.png")
+    return [f"{case.name}: {f['why']}" for f in result["failed"]]
+
+
+def leave(result, files):
     for file in files:
         file.parent.mkdir(parents=True, exist_ok=True)
         part = file.with_suffix(".part")
         part.write_text(json.dumps(result) + "\n")
         part.rename(file)
-    return [f"{case.name}: {f['why']}" for f in result["failed"]]
 
 
 def draw(case, done, file):
     """The picture of what moves, of the first unculled and the first culled run."""
-    framed = {job.point.family: job for job, run in done.items() if job.frames and not isinstance(run, str)}
+    framed = {job.point.family: job for job, run in done.items() if job.frames and not isinstance(run, (str, EarlierRun))}
     if UNCULLED not in framed or SLEEP not in framed:
         return
     final = read_final(framed[UNCULLED].file(".final"))
