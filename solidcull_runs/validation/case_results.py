@@ -16,7 +16,7 @@ from .points import ALSO, BY_HAND, PAPER, UNCULLED
 
 MOVED = 1e-2  # mean diameters between two snapshots: what moves
 DRAWN = 120  # values kept of a curve
-FIELDS_OF = 5  # runs of each point
+DRAWN_OF = 5  # runs of each point: their fields and curves
 WANTED = {"case", "title", "claim", "reference", "size", "metrics", "scenes", "failed", "bound", "fields", "laws", "lost", "lost_refilled"}
 
 
@@ -53,7 +53,7 @@ def run_data(job, run):
             **granules_of(run)}
     if job.point.default:
         data["loops"] = loops(job.file(".log").read_text(errors="replace"))
-    if job.point.default and job.scene == job.case.main_scene:
+    if job.point.default and job.scene == job.case.main_scene and job.k < DRAWN_OF:
         data["curves"] = {metric: curve(run, column) for metric, column in job.case.get("curves", {}).items()}
     return data
 
@@ -86,7 +86,7 @@ def result_of(case, done, decided=False, earlier=None):
     main = {job: run for job, run in done.items() if job.scene == case.main_scene and not isinstance(run, (str, EarlierRun))}
     finals = {}
     for job, run in main.items():
-        if run.final is not None and job.k < FIELDS_OF:
+        if run.final is not None and job.k < DRAWN_OF:
             finals.setdefault(job.point, []).append(run.final)
     unculled = next((p for p in finals if p.family == UNCULLED), None)
     if unculled:

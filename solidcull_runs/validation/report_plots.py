@@ -29,7 +29,7 @@ def curves(result, file):
     units = {m["name"]: m["unit"] for m in result["metrics"]}
     figure, axes = grid(len(names))
     for ax, name in zip(axes, names):
-        runs = [r["curves"][name] for r in unculled["runs"]]
+        runs = [r["curves"][name] for r in unculled["runs"] if r.get("curves")]
         end = min(t[-1] for t, _ in runs)
         t = np.linspace(max(t[0] for t, _ in runs), end, 200)
         band = np.array([np.interp(t, *r) for r in runs])
@@ -37,7 +37,7 @@ def curves(result, file):
         ax.plot(t, band.mean(axis=0), color="0.35", lw=1)
         for entry in scene["points"].values():
             if entry["default"] and entry["family"] != UNCULLED:
-                for k, r in enumerate(entry["runs"]):
+                for k, r in enumerate(r for r in entry["runs"] if r.get("curves")):
                     ax.plot(*r["curves"][name], color=COLOURS[entry["family"]], lw=0.9, label=None if k else entry["family"])
         ax.set(xlabel="time (s)", ylabel=f"{name} ({units[name]})")
     axes[0].legend(fontsize=7)
