@@ -800,6 +800,28 @@ class Command(Folder):
         self.assertEqual(sum(len(e["runs"]) for s in result["scenes"].values() for e in s["points"].values()), len(jobs) - 1)
         self.assertEqual(result["bound"], {"moving": 3})
 
+    def test_results_are_kept_on_the_way(self):
+        case, jobs = self.earlier(self.folder / "there", "fix")
+        given, kept = self.result_with(case, jobs), self.folder / "kept.json"
+        found = Earlier(given, jobs)
+        job = jobs[1]
+
+        def run_all(jobs, course, earlier, after):
+            after({job: found.run_of(job)})
+            left = json.loads(kept.read_text()) if kept.exists() else {"scenes": {}}
+            self.left = [run for s in left["scenes"].values() for e in s["points"].values() for run in e["runs"]]
+            return {job: found.run_of(job)}
+        for every, number in ((1e9, 0), (0, 1)):
+            with unittest.mock.patch.object(case_runs, "run_all", run_all), unittest.mock.patch.object(command, "LEFT_EVERY", every):
+                kept.unlink(missing_ok=True)
+                command.run_case(case, jobs, case_runs.Course(jobs, 1, print), [kept], self.folder)
+            self.assertEqual(len(self.left), number)
+
+        kept.write_text(json.dumps(given))
+        with unittest.mock.patch.object(case_runs, "run_all", run_all), unittest.mock.patch.object(command, "LEFT_EVERY", 0):
+            command.run_case(case, jobs, case_runs.Course(jobs, 1, print), [kept], self.folder)
+        self.assertEqual(len(self.left), len(jobs), "fewer runs did not take the place of what was kept")
+
     def test_an_unknown_case(self):
         status, said = self.validate("true", "crater")
         self.assertEqual(status, 2)

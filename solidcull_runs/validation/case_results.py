@@ -91,7 +91,7 @@ def result_of(case, done, decided=False, earlier=None):
     unculled = next((p for p in finals if p.family == UNCULLED), None)
     if unculled:
         for p, of_point in finals.items():
-            if p is not unculled and (p.default or p.family in (PAPER, ALSO)):
+            if p is not unculled and len(finals[unculled]) > 1 and (p.default or p.family in (PAPER, ALSO)):
                 result["fields"][p.name] = fields.distances(of_point, finals[unculled])
         diameter = 2 * float(np.median(finals[unculled][0]["radius"]))
         framed = next((job for job in main if job.point is unculled and job.frames), None)

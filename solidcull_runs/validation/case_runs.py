@@ -170,9 +170,9 @@ def jobs_of(case, out, beds, launcher, fix, also=(), ranks=1):
     return jobs
 
 
-def run_all(jobs, course, earlier=None):
+def run_all(jobs, course, earlier=None, after=lambda done: None):
     """Runs them in their order, as many at once as the course says: {job: run, or the line that says why there is none}. One that
-    fails stops none. Those of `earlier` (an Earlier) are taken from there."""
+    fails stops none. Those of `earlier` (an Earlier) are taken from there. `after`: is called after each run that is made."""
     at_once, waiting, running, done, ended = course.at_once, list(jobs), [], {}, []
     try:
         while waiting or running or ended:
@@ -195,6 +195,7 @@ def run_all(jobs, course, earlier=None):
                 except RunError as e:
                     done[job] = str(e)
                     course.end(job, process.wall, f"FAILED: {e}")
+                after(done)
             ended = [pair for pair in running if pair[1].ended()]
             running = [pair for pair in running if pair not in ended]
             if not ended:

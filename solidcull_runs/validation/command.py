@@ -9,6 +9,7 @@ Exit: 0 the report is written and nothing is lost, 1 a granule is lost, 2 a case
 import argparse
 import json
 import sys
+import time
 from pathlib import Path
 
 from .. import engine, errors
@@ -20,6 +21,7 @@ from .earlier import Earlier, EarlierRun
 from .points import SLEEP, UNCULLED
 
 HERE = engine.ROOT / "validation"
+LEFT_EVERY = 300  # s between two results of a case that are left
 
 
 def options(argv):
@@ -65,28 +67,34 @@ def say(line):
 
 def run_case(case, jobs, course, files, out, maker=None):
     """Runs it and leaves its results in these files; the lines of what failed. Runs of the last file's result are not made again.
-    `maker`: of more runs, until its metrics are decided. Results are left before each such step, too."""
+    `maker`: of more runs, until its metrics are decided. Results are left on the way, too."""
     earlier = Earlier(case_results.read_result(files[-1]) if files[-1].exists() else None, jobs)
-    done = case_runs.run_all(jobs, course, earlier)
-    while True:
-        result = case_results.result_of(case, done, bool(maker), earlier)
-        leave(result, files)
+    done, left = {}, time.monotonic()
+
+    def leave(of_step):
+        nonlocal left
+        left = time.monotonic()
+        result = case_results.result_of(case, done | of_step, bool(maker), earlier)
+        for file in files:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            part = file.with_suffix(".part")
+            part.write_text(json.dumps(result) + "\n")
+            part.rename(file)
+        return result
+
+    def now_and_then(of_step):
+        # runs that were kept of pairs to come are not yet among those
+        if time.monotonic() - left > LEFT_EVERY and len(done | of_step) >= len(earlier.runs):
+            leave(of_step)
+
+    while jobs:
+        done |= case_runs.run_all(jobs, course, earlier, now_and_then)
         wanted = deciding.further(case, done) if maker else {}
-        if not wanted:
-            break
-        more = [job for scene, of_scene in wanted.items() for job in maker.jobs(scene, of_scene)]
-        course.add(more)
-        done |= case_runs.run_all(more, course, earlier)
+        jobs = [job for scene, of_scene in wanted.items() for job in maker.jobs(scene, of_scene)]
+        course.add(jobs)
+    result = leave({})
     draw(case, done, out / case.name / "what_moves.png")
     return [f"{case.name}: {f['why']}" for f in result["failed"]]
-
-
-def leave(result, files):
-    for file in files:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        part = file.with_suffix(".part")
-        part.write_text(json.dumps(result) + "\n")
-        part.rename(file)
 
 
 def draw(case, done, file):
