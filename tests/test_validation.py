@@ -822,6 +822,18 @@ class Command(Folder):
             command.run_case(case, jobs, case_runs.Course(jobs, 1, print), [kept], self.folder)
         self.assertEqual(len(self.left), len(jobs), "fewer runs did not take the place of what was kept")
 
+    def test_results_are_kept_where_the_user_stops(self):
+        case, jobs = self.earlier(self.folder / "there", "fix")
+        found, kept = Earlier(self.result_with(case, jobs), jobs), self.folder / "kept.json"
+
+        def run_all(jobs, course, earlier, after):
+            after({job: found.run_of(job) for job in jobs[:3]})
+            raise KeyboardInterrupt
+        with unittest.mock.patch.object(case_runs, "run_all", run_all), self.assertRaises(KeyboardInterrupt):
+            command.run_case(case, jobs, case_runs.Course(jobs, 1, print), [kept], self.folder)
+        result = json.loads(kept.read_text())
+        self.assertEqual(sum(len(e["runs"]) for s in result["scenes"].values() for e in s["points"].values()), 3)
+
     def test_an_unknown_case(self):
         status, said = self.validate("true", "crater")
         self.assertEqual(status, 2)

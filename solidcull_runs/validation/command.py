@@ -69,9 +69,9 @@ def run_case(case, jobs, course, files, out, maker=None):
     """Runs it and leaves its results in these files; the lines of what failed. Runs of the last file's result are not made again.
     `maker`: of more runs, until its metrics are decided. Results are left on the way, too."""
     earlier = Earlier(case_results.read_result(files[-1]) if files[-1].exists() else None, jobs)
-    done, left = {}, time.monotonic()
+    done, of_step, left = {}, {}, time.monotonic()
 
-    def leave(of_step):
+    def leave():
         nonlocal left
         left = time.monotonic()
         result = case_results.result_of(case, done | of_step, bool(maker), earlier)
@@ -82,17 +82,26 @@ def run_case(case, jobs, course, files, out, maker=None):
             part.rename(file)
         return result
 
-    def now_and_then(of_step):
-        # runs that were kept of pairs to come are not yet among those
-        if time.monotonic() - left > LEFT_EVERY and len(done | of_step) >= len(earlier.runs):
-            leave(of_step)
+    def leave_so_far():
+        if len(done | of_step) >= len(earlier.runs):  # runs that were kept of pairs to come are not yet among those
+            leave()
 
-    while jobs:
-        done |= case_runs.run_all(jobs, course, earlier, now_and_then)
-        wanted = deciding.further(case, done) if maker else {}
-        jobs = [job for scene, of_scene in wanted.items() for job in maker.jobs(scene, of_scene)]
-        course.add(jobs)
-    result = leave({})
+    def after(made):
+        nonlocal of_step
+        of_step = made
+        if time.monotonic() - left > LEFT_EVERY:
+            leave_so_far()
+
+    try:
+        while jobs:
+            done |= case_runs.run_all(jobs, course, earlier, after)
+            wanted = deciding.further(case, done) if maker else {}
+            jobs = [job for scene, of_scene in wanted.items() for job in maker.jobs(scene, of_scene)]
+            course.add(jobs)
+    except KeyboardInterrupt:
+        leave_so_far()
+        raise
+    result = leave()
     draw(case, done, out / case.name / "what_moves.png")
     return [f"{case.name}: {f['why']}" for f in result["failed"]]
 
