@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT))
 from solidcull_runs import logs  # noqa: E402
-from solidcull_runs.validation.earlier import Earlier, EarlierRun, mark  # noqa: E402
+from solidcull_runs.validation.earlier import Earlier, EarlierRun  # noqa: E402
 from solidcull_runs.validation import (case_results, case_runs, cases, command, deciding, fields, first_page, forecasts, kept_figures, pages,  # noqa: E402
                                        points, report, sequential, short_cases, verdicts)
 from solidcull_runs.errors import RunError  # noqa: E402
@@ -754,7 +754,7 @@ class Command(Folder):
 
     def result_with(self, case, jobs):
         """As if all of these were run: alike, but for a little."""
-        done = {job: EarlierRun({"k": job.k, "mark": mark(job), "seconds": 1.0, "steps": 1, "counts": {}, "granules": 8, "twice": 0, "missing": 0,
+        done = {job: EarlierRun({"k": job.k, "mark": job.mark, "seconds": 1.0, "steps": 1, "counts": {}, "granules": 8, "twice": 0, "missing": 0,
                                  "values": {m.name: 1 + 1e-6 * (job.k + len(job.point.family)) for m in case.metrics}}) for job in jobs}
         return {**case_results.result_of(case, done), "fields": {"sleep 3 0": "of finals"}, "bound": {"moving": 3}, "lost": 0}
 

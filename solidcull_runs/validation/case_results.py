@@ -11,7 +11,7 @@ from ..errors import RunError
 from ..logs import loops
 from . import fields
 from .cases import PRODUCTION
-from .earlier import Earlier, EarlierRun, mark
+from .earlier import Earlier, EarlierRun
 from .points import ALSO, BY_HAND, PAPER, UNCULLED
 
 MOVED = 1e-2  # mean diameters between two snapshots: what moves
@@ -49,7 +49,7 @@ def run_data(job, run):
     if run.counts:
         counts = {name: float(run.counts[name].mean()) for name in ("exterior", "interface", "interior")}
         counts |= {name: float(run.counts[name][-1]) for name in ("culled", "restored", "carves", "seconds", "restore_energy")}
-    data = {"k": job.k, "mark": mark(job), "seconds": round(run.own_time, 3), "steps": run.steps(), "counts": counts, "values": run.metrics,
+    data = {"k": job.k, "mark": job.mark, "seconds": round(run.own_time, 3), "steps": run.steps(), "counts": counts, "values": run.metrics,
             **granules_of(run)}
     if job.point.default:
         data["loops"] = loops(job.file(".log").read_text(errors="replace"))

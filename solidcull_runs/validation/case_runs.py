@@ -1,5 +1,6 @@
 """The runs of a validation case: its beds, and its jobs at every point."""
 import concurrent.futures
+import functools
 import re
 import statistics
 import time
@@ -39,6 +40,12 @@ class CaseJob(KeptJob):
         name = re.sub(r"[^\w.]+", "-", f"{scene} {point.name} {k + 1}".strip())
         super().__init__(case.deck, out, kind, 0, variables, ranks, shifted=False, extra=self.measured, launcher=launcher,
                          keywords=point.keywords or None, name=name, made_with=made_with)
+
+    @functools.cached_property
+    def mark(self):
+        """Of all that makes this run what it is, the same on all machines: the folder of all output (OUT/full/CASE/runs/NAME) is no part
+        of it."""
+        return short_hash([self.recipe().replace(str(self.base.parents[3]), ""), (self.case.folder / "case.py").read_text()])
 
     def measured(self, run):
         run.start = dumps.read_final(self.file(".start"))

@@ -1,8 +1,6 @@
 """Runs of a case that were made before, on this or another machine, and of which only the result is left. They are not made again as
-long as deck, bed, variables, case and fix are the same: each run in a result has a mark of these."""
+long as deck, bed, variables, case and fix are the same: each run in a result has a mark of these (CaseJob.mark)."""
 from dataclasses import dataclass
-
-from .cases import short_hash
 
 
 @dataclass(frozen=True)
@@ -13,11 +11,6 @@ class EarlierRun:
     @property
     def metrics(self):
         return self.data["values"]
-
-
-def mark(job):
-    """The same on all machines: the folder of all output is no part of it."""
-    return short_hash([job.recipe().replace(str(job.base.parents[3]), ""), (job.case.folder / "case.py").read_text()])
 
 
 class Earlier:
@@ -37,7 +30,7 @@ class Earlier:
         return job.scene, job.point.name, job.k
 
     def is_of(self, job):
-        return self.runs[self.key(job)].get("mark") == mark(job)
+        return self.runs[self.key(job)].get("mark") == job.mark
 
     def run_of(self, job):
         """The run of this job; None if it must be made."""
