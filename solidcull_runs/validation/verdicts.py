@@ -98,7 +98,7 @@ class Judged:
     default: bool
     runs: int
     seconds: float      # median, of the loop, on a core
-    of_unculled: float  # that over the unculled runs' median
+    of_unculled: float  # that over the unculled run's of the same number, median: the two ran one after the other, on one machine
     exterior: float     # mean; None where the fix counted nothing
     interface: float
     restored: float
@@ -137,6 +137,12 @@ def unculled_of(scene):
     return next((entry for entry in scene["points"].values() if entry["family"] == UNCULLED), None)
 
 
+def of_same_number(runs, others, figure):
+    """The median of a figure of a run over that of the other of the same number."""
+    by_number = {r["k"]: figure(r) for r in others}
+    return statistics.median(figure(r) / by_number[r["k"]] for r in runs if r["k"] in by_number)
+
+
 def verdict(metric, unculled, culled, added=False):
     """On a metric. `added`: pairs were added until it was decided."""
     def allowed(mean):
@@ -152,7 +158,6 @@ def judge(result, scene=None):
     unculled = unculled_of(scene)
     if not unculled or len(unculled["runs"]) < 2:
         return {}
-    whole = statistics.median(r["seconds"] for r in unculled["runs"])
     judged = {}
     for name, entry in scene["points"].items():
         if entry is unculled:
@@ -164,7 +169,7 @@ def judge(result, scene=None):
             return statistics.fmean(there) if there else None
         added = result.get("decided", False) and entry["default"] and len(entry["runs"]) > 1
         judged[name] = Judged(name, entry["family"], entry["absolute"], entry["share"], entry["default"], len(entry["runs"]), seconds,
-                              seconds / whole, mean("exterior"), mean("interface"), mean("restored"),
+                              of_same_number(entry["runs"], unculled["runs"], lambda r: r["seconds"]), mean("exterior"), mean("interface"), mean("restored"),
                               {m["name"]: verdict(m, values_of(unculled, m["name"]), values_of(entry, m["name"]), added) for m in result["metrics"]})
     return judged
 
