@@ -325,6 +325,43 @@ class Sequential(unittest.TestCase):
         self.assertRaises(ValueError, verdicts.in_looks, {0: 1.0, 1: 2.0}, {1: 1.0}, abs)
 
 
+class OverScenes(unittest.TestCase):
+    """What no scene of a case has decided alone."""
+
+    METRIC = {"name": "lift", "unit": "N", "margin": 0.1, "relative": True}
+
+    def result(self, *differences):
+        """A scene for each list of what `sleep` is off by, of unculled 10 N in the first one, 20 N in the second."""
+        def entry(family, values):
+            runs = [{"k": k, "values": {"lift": x}, "seconds": 1.0, "counts": {}} for k, x in enumerate(values)]
+            return {"family": family, "absolute": 3.0, "share": 0.0, "default": True, "runs": runs}
+        scenes = {f"{k}": {"points": {"unculled": entry("unculled", [10.0 * (k + 1)] * len(off)),
+                                      "sleep 3 0": entry("sleep", [10.0 * (k + 1) + x for x in off])}} for k, off in enumerate(differences)}
+        return {"case": "blade", "decided": True, "metrics": [self.METRIC], "scenes": scenes}
+
+    def test_the_mean_of_all_in_their_own_margins(self):
+        one, other = [3.0, -2.4] * 15, [2.0, -4.4] * 15
+        result = self.result(one, other)
+        words = [verdicts.default_of(verdicts.judge(result, scene), "sleep").verdicts["lift"].word for scene in result["scenes"].values()]
+        self.assertEqual(words, [verdicts.OPEN, verdicts.OPEN])
+        v = verdicts.over_scenes(result, self.METRIC, "sleep")
+        self.assertAlmostEqual(v.difference, (0.3 - 0.6) / 2, 12)
+        half = sequential.quantile(30) * math.sqrt((statistics.variance(one) + statistics.variance(other) / 4) / 30) / 2
+        self.assertAlmostEqual(v.high - v.low, 2 * half, 12)
+        self.assertEqual(v.word, verdicts.SAME)
+        self.assertEqual(report.over_scenes(result), [["lift", "`sleep`", f"{v.low:+.2f} to {v.high:+.2f}", "equivalent"]])
+
+    def test_not_where_one_is_outside_or_all_are_decided(self):
+        scattered, off, near = [3.0, -2.4] * 15, [5.0, 5.1] * 15, [0.1, -0.1] * 15
+        self.assertEqual(report.over_scenes(self.result(scattered, off)), [])
+        self.assertEqual(report.over_scenes(self.result(near, near)), [])
+        self.assertEqual(report.over_scenes(self.result(scattered)), [])
+
+    def test_of_few_pairs_there_is_none(self):
+        self.assertIsNone(verdicts.over_scenes(self.result([3.0, -2.4] * 15, [1.0, -1.0] * 2), self.METRIC, "sleep"))
+        self.assertIsNone(verdicts.over_scenes(self.result([3.0, -2.4] * 15), self.METRIC, "live"))
+
+
 class KeptPage:
     """What is kept of the script validation/NAME/NAME.py: values, and a page that is made of them."""
 

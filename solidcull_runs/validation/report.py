@@ -112,6 +112,21 @@ def metric_rows(result, judged):
     return head, rows
 
 
+def over_scenes(result):
+    """Of the figures that pairs did not decide in some scene, and that are outside in none: the verdict on the mean of all scenes."""
+    if not result.get("decided") or len(result["scenes"]) < 2:
+        return []
+    rows = []
+    for m in result["metrics"]:
+        for family in (SLEEP, LIVE):
+            defaults = [verdicts.default_of(verdicts.judge(result, scene), family) for scene in result["scenes"].values()]
+            word = verdicts.worst_of({j.verdicts[m["name"]].word for j in defaults if j})
+            v = verdicts.over_scenes(result, m, family) if word == verdicts.OPEN else None
+            if v:
+                rows.append([m["name"], f"`{family}`", f"{v.low:+.2f} to {v.high:+.2f}", v.word])
+    return rows
+
+
 def case_section(page, result, folder, runs_folder):
     judged = verdicts.judge(result)
     name = result["case"]
@@ -149,6 +164,10 @@ def case_section(page, result, folder, runs_folder):
                        [[f"`{j.name}`", f"{j.speed_up:.2f}", f"{j.error:.2f}", j.worst, j.word] for j in others.values()])
             if result.get("decided"):
                 page.table(*metric_rows({**result, "scenes": {scene: of}}, others))
+    rows = over_scenes(result)
+    if rows:
+        page.text("What is not decided in a scene, on the mean of all of them, each in its own margins:")
+        page.table(["metric", "mode", "difference lies in, in margins", "verdict"], rows)
     if result["laws"]:
         families = ["unculled", SLEEP, LIVE]
         page.table(["law", "known", *families], [[law["what"], law["known"], *(figure_of(law["values"].get(f)) for f in families)] for law in result["laws"]])

@@ -29,6 +29,10 @@ class Verdict:
         return abs(self.difference) / self.margin if self.margin > 0 else math.inf
 
 
+def word_of(low, high, margin):
+    return SAME if -margin < low and high < margin else OTHER if low > margin or high < -margin else OPEN
+
+
 def two_one_sided_tests(unculled, culled, margin):
     """Two one-sided t tests on pairs of runs (Schuirmann 1987). `unculled`, `culled`: the value of each run by its number; runs of one
     number start alike, so what their start does to a figure is in neither. SAME: the difference is smaller than the margin, and
@@ -43,8 +47,7 @@ def two_one_sided_tests(unculled, culled, margin):
         error, freedom = statistics.stdev(unculled.values()) * math.sqrt(2), len(unculled) - 1
     half = float(stats.t.ppf(1 - LEVEL, freedom)) * error
     low, high = difference - half, difference + half
-    word = SAME if -margin < low and high < margin else OTHER if low > margin or high < -margin else OPEN
-    return Verdict(word, difference, low, high, margin)
+    return Verdict(word_of(low, high, margin), difference, low, high, margin)
 
 
 def in_looks(unculled, culled, margin_of):
@@ -59,7 +62,7 @@ def in_looks(unculled, culled, margin_of):
         taken = numbers[:n]
         margin = margin_of(statistics.fmean(unculled[k] for k in taken))
         difference, low, high = sequential.interval([culled[k] - unculled[k] for k in taken])
-        word = SAME if -margin < low and high < margin else OTHER if low > margin or high < -margin else OPEN
+        word = word_of(low, high, margin)
         if word != OPEN and n >= sequential.LOOKS[0]:
             break
     else:
@@ -143,13 +146,39 @@ def of_same_number(runs, others, figure):
     return statistics.median(figure(r) / by_number[r["k"]] for r in runs if r["k"] in by_number)
 
 
+def allowed(metric, mean):
+    """Its margin, where the unculled runs have this mean."""
+    return metric["margin"] * abs(mean) if metric["relative"] else metric["margin"]
+
+
 def verdict(metric, unculled, culled, added=False):
     """On a metric. `added`: pairs were added until it was decided."""
-    def allowed(mean):
-        return metric["margin"] * abs(mean) if metric["relative"] else metric["margin"]
     if added:
-        return in_looks(unculled, culled, allowed)
-    return two_one_sided_tests(unculled, culled, allowed(statistics.fmean(unculled.values())))
+        return in_looks(unculled, culled, lambda mean: allowed(metric, mean))
+    return two_one_sided_tests(unculled, culled, allowed(metric, statistics.fmean(unculled.values())))
+
+
+def over_scenes(result, metric, family):
+    """On the mean of all scenes of a case at the defaults, each in its own margins; None where a scene or the metric has no margin there.
+    What the line does to a figure is in each of them, and chance is another one in each. The interval is as sure as that of the scene
+    with the fewest pairs."""
+    means, squares, fewest = [], [], sequential.LOOKS[-1]
+    for scene in result["scenes"].values():
+        unculled, culled = unculled_of(scene), next((e for e in scene["points"].values() if e["default"] and e["family"] == family), None)
+        if not unculled or not culled:
+            return None
+        with_it, without = values_of(culled, metric["name"]), values_of(unculled, metric["name"])
+        numbers = sorted(set(with_it) & set(without))
+        margin = allowed(metric, statistics.fmean(without[k] for k in numbers)) if numbers else 0
+        if len(numbers) < sequential.LOOKS[0] or not margin:
+            return None
+        off = [(with_it[k] - without[k]) / margin for k in numbers]
+        means.append(statistics.fmean(off))
+        squares.append(statistics.variance(off) / len(off))
+        fewest = min(fewest, len(off))
+    mean, half = statistics.fmean(means), sequential.quantile(fewest) * math.sqrt(sum(squares)) / len(squares)
+    low, high = mean - half, mean + half
+    return Verdict(word_of(low, high, 1), mean, low, high, 1)
 
 
 def judge(result, scene=None):
@@ -187,8 +216,8 @@ def noise_of(result):
     found = []
     for m in result["metrics"]:
         values = list(values_of(unculled, m["name"]).values())
-        allowed = m["margin"] * abs(statistics.fmean(values)) if m["relative"] else m["margin"]
-        found.append(noise(values) / allowed if allowed else 0.0)
+        margin = allowed(m, statistics.fmean(values))
+        found.append(noise(values) / margin if margin else 0.0)
     return max(found)
 
 
