@@ -357,6 +357,9 @@ class OverScenes(unittest.TestCase):
         self.assertEqual(report.over_scenes(self.result(near, near)), [])
         self.assertEqual(report.over_scenes(self.result(scattered)), [])
 
+    def test_not_before_the_last_look(self):
+        self.assertEqual(report.over_scenes(self.result([3.0, -2.4] * 14, [3.0, -2.4] * 15)), [])
+
     def test_of_few_pairs_there_is_none(self):
         self.assertIsNone(verdicts.over_scenes(self.result([3.0, -2.4] * 15, [1.0, -1.0] * 2), self.METRIC, "sleep"))
         self.assertIsNone(verdicts.over_scenes(self.result([3.0, -2.4] * 15), self.METRIC, "live"))

@@ -113,15 +113,18 @@ def metric_rows(result, judged):
 
 
 def over_scenes(result):
-    """Of the figures that pairs did not decide in some scene, and that are outside in none: the verdict on the mean of all scenes."""
+    """Of the figures that as many pairs as there may be did not decide in some scene, and that are outside in none: the verdict on the
+    mean of all scenes."""
     if not result.get("decided") or len(result["scenes"]) < 2:
         return []
-    rows = []
+    judged, rows = [verdicts.judge(result, scene) for scene in result["scenes"].values()], []
     for m in result["metrics"]:
         for family in (SLEEP, LIVE):
-            defaults = [verdicts.default_of(verdicts.judge(result, scene), family) for scene in result["scenes"].values()]
-            word = verdicts.worst_of({j.verdicts[m["name"]].word for j in defaults if j})
-            v = verdicts.over_scenes(result, m, family) if word == verdicts.OPEN else None
+            of_scenes = [j.verdicts[m["name"]] for j in (verdicts.default_of(of, family) for of in judged) if j]
+            is_open = verdicts.worst_of({v.word for v in of_scenes}) == verdicts.OPEN
+            if not is_open or min(v.pairs or 0 for v in of_scenes if v.word == verdicts.OPEN) < sequential.LOOKS[-1]:
+                continue
+            v = verdicts.over_scenes(result, m, family)
             if v:
                 rows.append([m["name"], f"`{family}`", f"{v.low:+.2f} to {v.high:+.2f}", v.word])
     return rows
